@@ -1,8 +1,8 @@
-"""Simulated and recorded runs that several figures are measured on.
+"""Simulated and recorded runs for several benchmarks.
 
-Faults are those of one node from 25 s on. "Late" runs are those in which the tracker begins while
-everything moves; "robots" are late cars whose wheels are not known. "Exact" groups begin in motion
-as well, five in space with exact measurements, three in the plane with 5 cm of noise on ranges.
+Faults affect one node from 25 s on. In "late" runs the tracker starts while all nodes move;
+"robots" are late cars without wheel constraints in the filter. "Exact" groups also start in motion:
+five nodes in space with exact measurements, or three in the plane with 5 cm of range noise.
 Vehicles in a "convoy" follow each other (`tests/convoy.py`).
 Recordings are read from `RELPOS_DATA`, else `../shared/data`.
 """
@@ -32,18 +32,18 @@ from tracking.log import read_log
 from tracking.measurements import Kind
 
 FIRST = 7000
-"""Seed of the first run, of the second world 0 for it; no number was chosen on these runs."""
+"""Seed of the first run; it is seed 0 of the second world. No parameter was tuned on these runs."""
 RECORDINGS = ("isas_walk1", "inrol_env1")
 FAULT_AT = 25.0
-"""[s]"""
+"""[s] Start of the faults."""
 LATE = 12.0
-"""[s] When the tracker begins, and up to six seconds later."""
+"""[s] Earliest start of the tracker in late runs; it varies by up to six seconds."""
 WORLDS = {"car": "car", "hand": "hand", "drone": "drone", "body": "human"}
-"""Kind of the second world to its name there."""
+"""Kind of run to the vehicle in the second world."""
 
 
 class Case:
-    """Measurements with the truth."""
+    """Measurements with ground truth."""
 
     def __init__(
         self, constellation: Any, block: Any, t: F64, truth: F64, known: Any, heading: Any = None
@@ -53,7 +53,7 @@ class Case:
 
 
 def spoiled(block: Any, fault: str, seed: int) -> Any:
-    """Measurements with one node at fault from `FAULT_AT` on.
+    """Return measurements with one faulty node from `FAULT_AT` on.
 
     ``offset``: its ranges are 0.6 m too long, as by a wrong calibration. ``outliers``: half of them
     mean nothing, ``made up``: all of them. ``silent``: nothing of it for 3 s. ``frozen``: a pair of
@@ -62,7 +62,7 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
     most along x and y.
     """
     rng, node = np.random.default_rng(seed), 0
-    block = replace(block, values=block.values.copy())  # the run without the fault is kept
+    block = replace(block, values=block.values.copy())  # the run without the fault is cached
     t, ranges = block.t[0], block.kind[0] == Kind.RANGE
     of_node = (block.i[0] == node) | (ranges & (block.j[0] == node))
     late = t > FAULT_AT
@@ -99,13 +99,13 @@ def spoil_imu(block: Any, fault: str, hit: Any, rng: np.random.Generator) -> Non
 
 @cache
 def case(kind: str, seed: int) -> Case:
-    """One run, made once.
+    """Return one run, cached.
 
     Args:
-        kind: Of run: a scenario, ``hand``, ``drones``, the name of a recording, ``world KIND``,
-            ``exact VEHICLE``, ``convoy VEHICLE``; ``KIND, FAULT`` is one with a fault, ``late
-            KIND`` begins in motion.
-        seed: Of its random numbers.
+        kind: Kind of run: a scenario, ``hand``, ``drones``, the name of a recording, ``world
+            KIND``, ``exact VEHICLE``, ``convoy VEHICLE``; ``KIND, FAULT`` adds a fault, ``late
+            KIND`` starts in motion.
+        seed: Seed of the run.
     """
     first, _, rest = kind.partition(" ")
     kind, _, fault = kind.partition(", ")
@@ -139,7 +139,7 @@ def case(kind: str, seed: int) -> Case:
 
 
 def exact(vehicle: str, seed: int) -> Case:
-    """A group on circles of its own, in a numbering and at a rate of its own."""
+    """Return a group of nodes on circles, with random numbering and sample rate."""
     rng = np.random.default_rng(seed)
     n, d, seconds = (3, 2, 25.0) if vehicle == "robot" else (5, 3, 20.0)
     hz = float(rng.uniform(28.0, 125.0))
@@ -151,17 +151,17 @@ def exact(vehicle: str, seed: int) -> Case:
 
 
 def of_group(group: ExactGroup, seconds: float) -> Case:
-    """A group of the tests with its truth."""
+    """Return the case of a group of the tests."""
     t = np.arange(0.2, seconds - 0.5, 0.1)
     truth = group.pairs(t)
     return Case(group.constellation, group.block, t, truth, np.ones(truth.shape[:2], dtype=bool))
 
 
 def late(of: Case, seed: int, are_robots: bool) -> Case:
-    """A run whose tracker begins in motion; of cars whose wheels it does not know."""
+    """Return a run with a tracker that starts in motion, without wheel constraints if robots."""
     at, kind = of.t[0] + LATE + seed % 7, of.block.kind[0]
     block = of.block.take((of.block.t[0] >= at) | (kind == Kind.SURVEY))
-    # Surveyed distances hold from the start on.
+    # Surveyed distances are valid from the start on.
     block = replace(block, t=np.where(block.kind == Kind.SURVEY, at, block.t))
     who, times = of.constellation, of.t >= at
     if are_robots:
@@ -172,11 +172,11 @@ def late(of: Case, seed: int, are_robots: bool) -> Case:
 
 
 def recording(name: str) -> Any:
-    """A recorded log."""
+    """Read a recorded log."""
     return read_log(data() / "logs" / name)
 
 
 def data() -> Path:
-    """Where recordings are."""
+    """Return the folder of the recordings."""
     default = Path(__file__).resolve().parents[2] / "shared" / "data"
     return Path(os.environ.get("RELPOS_DATA", default))

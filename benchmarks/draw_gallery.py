@@ -1,4 +1,4 @@
-"""Draw the moving pictures of docs/reference/gallery.md: every task, and every scenario.
+"""Draw the animations of docs/reference/gallery.md: every task, and every scenario.
 
 Run `python benchmarks/draw_gallery.py`; about six minutes, needs pygame.
 """
@@ -18,9 +18,9 @@ from relpos_env.tasks import TASKS
 OUT = Path(__file__).resolve().parents[1] / "docs" / "images" / "gallery"
 SECONDS, SEED = 20.0, 2
 ROOM = 0.692
-"""[-] Width of the room on the picture; the rest is the legend."""
+"""[-] Share of the room in the width of a frame; the rest is the legend."""
 WIDTH = 280
-"""[pixels]"""
+"""[px] Width of an animation."""
 EVERY = 4
 """[-] Every fourth frame is kept."""
 
@@ -42,7 +42,7 @@ def shrink(source: Path, target: Path) -> None:
 
 
 def main() -> None:
-    """Drive and draw."""
+    """Run the demonstrations and write their animations."""
     OUT.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
         jobs = [(f"task-{name}", ["--task", name]) for name in TASKS]

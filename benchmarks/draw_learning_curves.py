@@ -1,4 +1,4 @@
-"""Learning curves of training runs: their rows into one file, and the picture of that file.
+"""Learning curves of training runs: records in one file, and a figure of that file.
 
 python benchmarks/draw_learning_curves.py RUN ...    collects legs.jsonl of the runs, then draws
 python benchmarks/draw_learning_curves.py            draws results/learning-curves.jsonl again
@@ -21,7 +21,7 @@ PICTURE = ROOT / "docs" / "images" / "learning-curves.svg"
 
 
 def collect(folders: list[Path]) -> list[dict[str, Any]]:
-    """Rows of all runs, each with its task, what it was trained on and its seed."""
+    """Return the records of all runs, each with task, observation mode and seed."""
     rows = []
     for folder in folders:
         config = RunFolder(folder).config()
@@ -33,7 +33,7 @@ def collect(folders: list[Path]) -> list[dict[str, Any]]:
 
 
 def draw(rows: list[dict[str, Any]]) -> bytes:
-    """The picture, one line a run, one colour for each task and mode of observations."""
+    """Return the figure: one line per run, one colour per task and observation mode."""
     runs: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for row in rows:
         label = f"{row['task']}, on {row['trained_on']}"

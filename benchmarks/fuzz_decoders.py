@@ -1,15 +1,15 @@
-"""Look for bytes that upset a decoder, guided by the code they reach.
+"""Coverage-guided fuzzing of the decoders.
 
 pip install atheris
 python benchmarks/fuzz_decoders.py FORMAT --seconds 120 --corpus DIR  any format of the registry
 python benchmarks/fuzz_decoders.py FORMAT --replay --corpus DIR  lines that the corpus reaches
 
-The inputs begin with the frames and words of tests/hardware_bridge/decoder_samples.py. Every
-input is fed whole and cut; both must give the same, nothing may raise, no more than the bound may
-be kept, and of two good frames that follow the second must be read. Where frames end with a sum,
-which chance seldom hits, the input is also fed with its sum behind it; for our own nodes, as a
-whole frame with MAC and sum, stuffed. Kernels run as plain Python, so that their branches count.
-What breaks a law is written to the directory as a file ``crash-...``.
+The initial corpus contains the frames and tokens of tests/hardware_bridge/decoder_samples.py. Every
+input is fed whole and split. Invariants: both give the same readings, nothing raises, the buffer
+stays within its limit, and the second of two valid frames after the input is decoded. For formats
+with a checksum, which random inputs rarely match, the input is also fed with a valid checksum; for
+our own nodes, as a COBS frame with MAC and checksum. Kernels run as plain Python, so that their
+branches count as coverage. Inputs that violate an invariant are written as files ``crash-...``.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 MOST_FRAME = 500
-"""[bytes] Of a message that leaves room for MAC and sum."""
+"""[byte] Longest message of a frame without MAC and checksum."""
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "hardware_bridge")]
 FOLDERS = [ROOT / "hardware_bridge" / name for name in ("decoders", "wire")]
 os.environ["NUMBA_DISABLE_JIT"] = "1"
-warnings.filterwarnings("ignore", "overflow encountered", RuntimeWarning)  # as hashes do
+warnings.filterwarnings("ignore", "overflow encountered", RuntimeWarning)  # hashes overflow
 
 
 def plain(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """A kernel that is not compiled: fields of records are no attributes of numpy's own arrays."""
+    """Wrap an uncompiled kernel: views of structured arrays as recarrays, for attribute access."""
     import numpy as np
 
     def call(*arrays: Any) -> Any:
@@ -47,7 +47,7 @@ def plain(kernel: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_of(name: str) -> Callable[[bytes], None]:
-    """What is asked of every input."""
+    """Return a function that asserts the invariants of a decoder for one input."""
     from hardware_bridge.decoders import DECODERS
     from hardware_bridge.decoders.base import MOST_WAITING
     from hardware_bridge.wire.codec import kernels
@@ -80,7 +80,7 @@ def check_of(name: str) -> Callable[[bytes], None]:
 
 
 def framed(data: bytes) -> bytes:
-    """What our own nodes put round a message."""
+    """Return a message as a frame of our own nodes, with MAC, checksum and COBS."""
     from cobs import cobs
     from wire_twin import KEY, siphash
 
@@ -90,7 +90,7 @@ def framed(data: bytes) -> bytes:
 
 
 def unframed(frame: bytes) -> bytes:
-    """The message in a frame with MAC and sum."""
+    """Return the message of a frame with MAC and checksum."""
     from cobs import cobs
 
     message: bytes = cobs.decode(frame.strip(b"\0"))[:-12]
@@ -98,7 +98,7 @@ def unframed(frame: bytes) -> bytes:
 
 
 def fuzz(name: str, corpus: Path, seconds: int) -> None:
-    """Run libFuzzer; it ends the process."""
+    """Run libFuzzer, which exits the process."""
     import atheris
 
     with atheris.instrument_imports(include=["hardware_bridge.decoders", "hardware_bridge.wire"]):
@@ -130,7 +130,7 @@ def fuzz(name: str, corpus: Path, seconds: int) -> None:
 
 
 def lines_of(code: CodeType) -> Iterator[int]:
-    """Lines of the functions in some code."""
+    """Yield the line numbers of all functions in a code object."""
     if code.co_flags & inspect.CO_OPTIMIZED:
         yield from (line for _, line in dis.findlinestarts(code) if line is not None)
     for inner in code.co_consts:
@@ -139,7 +139,7 @@ def lines_of(code: CodeType) -> Iterator[int]:
 
 
 def replay(name: str, corpus: Path) -> None:
-    """Print how much of each file of the decoders the inputs of a corpus reach."""
+    """Print the line coverage of each decoder file by the inputs of a corpus."""
     ran: dict[str, set[int]] = {}
 
     def trace(frame: FrameType, event: str, argument: Any) -> Any:

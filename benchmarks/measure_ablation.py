@@ -1,4 +1,4 @@
-"""What each mechanism of the joint filter is worth: each left out on the same runs.
+"""Ablation of the joint filter: each mechanism is disabled on the same runs.
 
 For `docs/benchmarks/tracker.md`. A mechanism is left out by parameters alone. Errors are paired
 with those of the whole filter on the same seeds: the median ratio and its 95 % interval by the
@@ -28,28 +28,28 @@ from tracking.metrics.score import score
 
 NEVER, ALWAYS = 1e9, 1e-9
 SKIP, WRONG = 10.0, 0.5
-"""[s, m] Not scored; a pair that is off by more is wrong."""
+"""[s], [m] Time at the start that is not scored; position error above which a pair is wrong."""
 
 
 def joint(change: Callable[[JointParams], JointParams]) -> Callable[[TrackerParams], TrackerParams]:
-    """Parameters with some of the joint filter's changed."""
+    """Return a function that changes parameters of the joint filter."""
     return lambda p: replace(p, filter=replace(p.filter, joint=change(p.filter.joint)))
 
 
 def part(name: str, **values: Any) -> Callable[[TrackerParams], TrackerParams]:
-    """Parameters with some of a part of the joint filter's changed."""
+    """Return a function that changes parameters of a part of the joint filter."""
     return joint(lambda p: replace(p, **{name: replace(getattr(p, name), **values)}))
 
 
 def vehicles(**values: Any) -> Callable[[TrackerParams], TrackerParams]:
-    """Parameters with those of every vehicle changed."""
+    """Return a function that changes parameters of all vehicles."""
     return joint(
         lambda p: replace(p, vehicles={k: replace(v, **values) for k, v in p.vehicles.items()})
     )
 
 
 def nlos(**values: Any) -> Callable[[TrackerParams], TrackerParams]:
-    """Parameters of ranges without line of sight changed, in the plane and in space."""
+    """Return a function that changes NLOS parameters, in the plane and in space."""
     return joint(
         lambda p: replace(
             p, nlos=replace(p.nlos, **values), nlos_in_space=replace(p.nlos_in_space, **values)
@@ -109,11 +109,11 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "IMU: saturation": sanity(chance=1e-300, held_long=NEVER),
     "stale nodes": joint(lambda p: replace(p, range_timeout=NEVER)),
 }
-"""Name to parameters without it."""
+"""Mechanism to the change of parameters that disables it."""
 
 
 def figures(of: Case, params: TrackerParams) -> tuple[float, float, float, float]:
-    """rmse_yaw [m], rmse_shape [m], shares of pairs and time that are ok and wrong, and ok."""
+    """Return rmse_yaw [m], rmse_shape [m], and the shares that are ok and wrong, and ok [-]."""
     estimate = Tracker(of.constellation, params).run(of.block, of.t).take(0)
     found = score(estimate, of.truth, of.known, of.t[0] + SKIP)
     turned = rotate(quat_from_yaw(-np.radians(found.yaw_deg or 0.0)), of.truth)
@@ -124,7 +124,7 @@ def figures(of: Case, params: TrackerParams) -> tuple[float, float, float, float
 
 
 def run(job: tuple[str, int, list[str]]) -> tuple[str, list[tuple[float, float, float, float]]]:
-    """Figures of one run: of the whole filter, then without each mechanism."""
+    """Return the metrics of one run: of the complete filter, then without each mechanism."""
     kind, seed, names = job
     of, whole = case(kind, seed), TrackerParams()
     case.cache_clear()
@@ -132,13 +132,13 @@ def run(job: tuple[str, int, list[str]]) -> tuple[str, list[tuple[float, float, 
 
 
 def interval(ratio: F64, rng: np.random.Generator) -> list[float]:
-    """Median of ratios and its 95 % interval."""
+    """Return the median of ratios and its 95 % interval."""
     draws = np.median(rng.choice(ratio, (2000, len(ratio))), axis=1)
     return [float(x) for x in (np.median(ratio), *np.quantile(draws, [0.025, 0.975]))]
 
 
 def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
-    """A row for each mechanism and kind of run."""
+    """Yield one row per mechanism and kind of run."""
     kinds = ["cars-los", "cars-nlos", "human", "drones", "hand"]
     kinds += [f"late {kind}" for kind in ("cars-nlos", "robots", "human", "drones", "hand")]
     kinds += ["convoy car", "convoy robot", "exact robot", "exact hand", "exact drone"]

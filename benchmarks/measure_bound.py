@@ -1,13 +1,12 @@
-"""How small a formation error can be on estimates, for `docs/benchmarks/results.md`.
+"""Lower bound of the formation error on estimates, for `docs/benchmarks/results.md`.
 
-Places are relative positions. Whoever drives by what the tracker measures cannot put another car
-nearer to its place than the spread of where it may be: formation errors are bounded by the
-posterior Cramer-Rao bound of the relative positions (`tracking.metrics.bound`), along the drives
-that are measured, in the task that the policy was trained for. That is a root mean square; the mean
-length of a Gaussian is at least sqrt(2 / pi) of it, where it lies on a line. What beams tell of
-walls is not in it.
+Targets are relative positions. A driver that uses the tracker's measurements cannot place a car
+more accurately than the relative positions can be estimated: formation errors are bounded by their
+posterior Cramer-Rao bound (`tracking.metrics.bound`), along the measured drives, in the task that
+the policy was trained for. The bound is a root mean square; the mean length of a Gaussian vector is
+at least sqrt(2 / pi) of it, the value for one dimension. Distance sensors are not in the bound.
 
-Run `python benchmarks/measure_bound.py [POLICY] [EPISODES]`; some seconds an episode. Seeds from
+Run `python benchmarks/measure_bound.py [POLICY] [EPISODES]`; some seconds per episode. Seeds from
 1000, 60 s each.
 """
 
@@ -30,7 +29,7 @@ MEASURES = "formation_error", "tracking_error"
 
 
 def measure(name: str, seed: int) -> tuple[float, float, float, float]:
-    """Formation and tracking error of an episode, bound as rms and as least mean [m]."""
+    """Return formation and tracking error of an episode, the bound as rms and least mean [m]."""
     policy = load_policy(name)
     proximity = policy.card.layout.proximity
     env = formation_v0.parallel_env(
@@ -55,7 +54,7 @@ def measure(name: str, seed: int) -> tuple[float, float, float, float]:
 
 
 def main() -> None:
-    """Print a line for each episode and the means."""
+    """Print one line per episode and the means."""
     name = sys.argv[1] if len(sys.argv) > 1 else "hold-beams"
     n_episodes = int(sys.argv[2]) if len(sys.argv) > 2 else 100
     rows = []

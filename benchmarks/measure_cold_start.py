@@ -1,13 +1,13 @@
-"""How soon a group knows where everybody is, from nothing but measurements.
+"""Convergence of the tracker after a cold start.
 
-Cars stand for two seconds and then drive. A start is judged three seconds later, over all pairs:
-the error in the world frame, and that after the best rotation, which magnetic north has no share
-in. Next to both stands the posterior Cramer-Rao bound of the same drive at the same moment
-(`tracking.metrics.bound`), with the errors that headings have here at first
+Cars are at rest for two seconds and then drive. Three seconds later the error over all pairs is
+measured in the world frame, and after the best rotation, which is independent of magnetic north.
+Both are compared with the posterior Cramer-Rao bound of the same drive at the same time
+(`tracking.metrics.bound`), with the initial heading errors of the simulation
 (`relpos_env.core.oracle_params`).
 
 Run `python benchmarks/measure_cold_start.py [SCENARIO] [FIRST SEED] [DRIVES] [JOBS] [FILE]`; some
-tenths of a second a drive, and writes a line of JSON for each into the file.
+tenths of a second per drive. Writes one JSON line per drive to the file.
 """
 
 from __future__ import annotations
@@ -30,33 +30,33 @@ from tracking.geometry import best_rotation
 from tracking.metrics.bound import posterior_bound
 
 JUDGED = STAND_STILL + 3.0
-"""[s] Since the start of the recording."""
+"""[s] Time of the measurement after the start of the recording."""
 SECONDS = 17.0
 NEAR, WRONG = 0.15, 1.0
-"""[m] What is asked for; a pair that is off by more is wrong."""
+"""[m] Target error; position error above which a pair is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """What came of a drive."""
+    """Results of one drive."""
 
     seed: int
     error: float
-    """Root mean square over the pairs, in the world frame [m]."""
+    """[m] RMS position error over the pairs, in the world frame."""
     turned: float
-    """After the best rotation [m]."""
+    """[m] RMS position error after the best rotation."""
     bound: float
-    """The least root mean square of `error` [m]."""
+    """[m] Bound of `error`."""
     bound_turned: float
-    """Of `turned` [m]."""
+    """[m] Bound of `turned`."""
     first_ok: float | None
-    """From the first move until all pairs were ok; None if never [s]."""
+    """[s] Time from the first motion until all pairs were ok; None if never."""
     ok_but_wrong: float
-    """How long a pair was ok and wrong in one go, at most [s]."""
+    """[s] Longest uninterrupted time in which a pair was ok and wrong."""
 
 
 def start(scenario: str, seed: int) -> Start:
-    """Judge one drive."""
+    """Measure one drive."""
     log = simulate(scenario=scenario, seconds=SECONDS, seed=seed)
     t = log.truth.times()
     t = t[t >= log.t_range[0]]
@@ -87,19 +87,19 @@ def _rms(vectors: np.ndarray) -> float:
 
 
 def _longest(t: np.ndarray, on: np.ndarray) -> float:
-    """The longest time without a break."""
+    """Return the longest uninterrupted time in which `on` is true [s]."""
     steps = np.diff(np.concatenate([[0], on.astype(np.int64), [0]]))
     begin, end = t[np.nonzero(steps == 1)[0]], t[np.nonzero(steps == -1)[0] - 1]
     return float((end - begin).max(initial=0.0))
 
 
 def share_near(bound: np.ndarray, bound_turned: np.ndarray, n_shape: int = 3) -> float:
-    """Share of drives below `NEAR`, of a filter with Gaussian errors as small as they can be.
+    """Return the share of drives below `NEAR` for an efficient filter with Gaussian errors.
 
     Args:
-        bound: Of each drive, in the world frame [m].
-        bound_turned: After the best rotation [m]; what is more of the other is the rotation.
-        n_shape: In how many ways shapes can be wrong, taken for equally uncertain: 3 of 3 cars.
+        bound: Bound of each drive in the world frame, (drive,) [m].
+        bound_turned: Bound after the best rotation, (drive,) [m]; the rest is the rotation.
+        n_shape: Degrees of freedom of the shape, assumed equally uncertain: 3 for 3 cars.
     """
     rng = np.random.default_rng(0)
     draws = 1000, len(bound)
@@ -109,7 +109,7 @@ def share_near(bound: np.ndarray, bound_turned: np.ndarray, n_shape: int = 3) ->
 
 
 def summary(starts: list[Start]) -> dict[str, float]:
-    """Shares of the drives, and what the bound would allow."""
+    """Return statistics of the drives and of their bounds."""
     of = {k: np.array([getattr(s, k) for s in starts]) for k in ("error", "turned", "bound",
         "bound_turned", "ok_but_wrong")}  # fmt: skip
     first = np.array([np.inf if s.first_ok is None else s.first_ok for s in starts])

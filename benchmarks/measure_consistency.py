@@ -1,12 +1,11 @@
-"""How wrong the joint filter believes itself to be, next to how wrong it is.
+"""Consistency of the joint filter.
 
 NEES and NIS of `joint` with the parameters of the simulated world
-(`relpos_env.core.oracle_params`), means over drives: 1 where errors are as large as the
-covariance says, more where it is too sure. The second case turns the magnetometer of one car by
-an angle that the filter knows nothing of.
+(`relpos_env.core.oracle_params`), means over drives: 1 is consistent, more is overconfident. With
+DEGREES, the magnetometer of one car is rotated by this angle, which the filter does not model.
 
 Run `python benchmarks/measure_consistency.py [SCENARIO] [FIRST SEED] [DRIVES] [JOBS] [DEGREES]`;
-some tenths of a second a drive of 40 s.
+some tenths of a second per drive of 40 s.
 """
 
 from __future__ import annotations
@@ -26,11 +25,11 @@ from tracking.measurements import Kind
 from tracking.metrics.score import score
 
 SECONDS, SKIP = 40.0, 10.0
-"""[s] Of a drive, and of it before errors count."""
+"""[s] Length of a drive; time at its start that is not scored."""
 
 
 def measure(scenario: str, degrees: float, seed: int) -> tuple[float, float]:
-    """NEES per degree of freedom and mean NIS of a drive."""
+    """Return the NEES per degree of freedom and the mean NIS of a drive."""
     log = simulate(scenario=scenario, seconds=SECONDS, seed=seed)
     block = log.block
     if degrees:
@@ -49,7 +48,7 @@ def measure(scenario: str, degrees: float, seed: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Print the means, and the drives that weigh most."""
+    """Print the means, and the drives with the largest NEES."""
     given = dict(enumerate(sys.argv[1:]))
     scenario, first = given.get(0, "cars-los"), int(given.get(1, 7000))
     degrees = float(given.get(4, 0.0))

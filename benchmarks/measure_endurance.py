@@ -2,14 +2,14 @@
 
 python benchmarks/measure_endurance.py --seconds 3600 --cars 6
 
-Prints the memory of every process once a minute and, at the end, how far it grew since the first
-minute, and how many ticks of the supervisor were more than 20 ms late. On every core a process that
-only sleeps, with a higher priority than all else and its memory locked, tells how often the machine
-itself stood; next to each missed tick is how long it did in the two seconds before that was told.
+Prints the memory of every process once a minute and, at the end, its growth since the first minute
+and the number of supervisor ticks that were more than 20 ms late. A process per core that only
+sleeps, with real-time priority and locked memory, measures how often the machine itself stalled;
+the longest stall in the two seconds before the report of each missed tick is printed.
 
 python benchmarks/measure_endurance.py --seconds 3600 --cars 6 --virtual
 
-Does the same in one process under a counted clock, as fast as it goes.
+Does the same in one process with a virtual clock, as fast as possible.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ ROOT = Path(__file__).parent.parent
 TESTS = ROOT / "tests" / "hardware_bridge"
 KB = 1024.0
 NAP, STOOD = 0.002, 0.01
-"""[s] A process that sleeps for so long, and wakes up so much later, was on a core that stood."""
+"""[s] Sleep of the watching processes; time between two wake-ups above which a core stalled."""
 NUMBERS = ("t", "missed", "late_decisions")
 """Fields of a row that are not the memory of a process."""
 TOLD = 2.0
-"""[s] A missed tick is told within that time."""
+"""[s] Longest delay of the report of a missed tick."""
 START = 120.0
-"""[s] For a drive to begin."""
+"""[s] Additional time for the start of a drive."""
 
 
 def memory(pid: int) -> float:
-    """Memory of a process [MB]; 0 if it is gone."""
+    """Return the resident memory of a process [MB]; 0 if it has ended."""
     try:
         lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     except OSError:
@@ -53,11 +53,11 @@ def memory(pid: int) -> float:
 
 
 def watch_core(core: int, talk: Connection) -> None:
-    """Sleep for 2 ms at a time until told to end; then tell when it took longer, [[s, ms], ...]."""
+    """Sleep in steps of 2 ms until a message is received; then send all stalls [(s, ms), ...]."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setaffinity(0, {core})
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(60))
-    ctypes.CDLL(None).mlockall(3)  # what is there and what will be
+    ctypes.CDLL(None).mlockall(3)  # MCL_CURRENT | MCL_FUTURE
     gc.disable()
     last = time.monotonic()
     stood = []
@@ -71,7 +71,7 @@ def watch_core(core: int, talk: Connection) -> None:
 
 
 class Watch:
-    """Processes that see the machine stand, one on each core."""
+    """Processes that detect stalls of the machine, one per core."""
 
     def __init__(self) -> None:
         spawn = multiprocessing.get_context("spawn")
@@ -83,7 +83,7 @@ class Watch:
             self._processes[-1].start()
 
     def end(self) -> list[list[tuple[float, float]]]:
-        """When each core stood [s], and for how long [ms]."""
+        """Return the stalls of each core: time [s] and duration [ms]."""
         for talk in self._talks:
             talk.send("end")
         return [talk.recv() for talk in self._talks]
@@ -95,7 +95,7 @@ class Watch:
 
 
 def children(pid: int) -> dict[str, int]:
-    """Processes below one, by what they are for."""
+    """Return the child processes of a process by their roles."""
     found = {}
     for status in Path("/proc").glob("[0-9]*/status"):
         try:
@@ -112,11 +112,11 @@ def children(pid: int) -> dict[str, int]:
 
 
 def real(seconds: float, cars: int, scenario: str) -> None:
-    """Emulator and drive in real time."""
+    """Run emulator and drive in real time."""
     folder = Path(tempfile.mkdtemp(prefix="endurance"))
     env = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     options = {"scenario": scenario, "cars": cars, "seed": 3, "seconds": seconds + START}
-    options["keep"] = False  # its disk may be slow, which is not what is measured
+    options["keep"] = False  # slow disks are not part of the measurement
     emulation = subprocess.Popen(
         [sys.executable, TESTS / "emulation_process.py", folder, json.dumps(options)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=env,
@@ -164,7 +164,7 @@ def real(seconds: float, cars: int, scenario: str) -> None:
 def _stood(
     stood: list[list[tuple[float, float]]], misses: list[float], begin: float
 ) -> dict[str, Any]:
-    """How often and how long each core stood; the same shortly before each missed tick."""
+    """Return number and length of the stalls of each core, and those before each missed tick."""
     return {
         "cores_stood_20_ms": [sum(ms > 20.0 for _, ms in core) for core in stood],
         "longest_ms": [max((ms for _, ms in core), default=0.0) for core in stood],
@@ -179,7 +179,7 @@ def _stood(
 
 
 def _arm_again(drive: subprocess.Popen[str], said: dict[str, Any]) -> None:
-    """As somebody would who watches it."""
+    """Arm the cars again, as an operator would."""
     if said.get("moved") and not all(said["armed"]) and drive.stdin is not None:
         with contextlib.suppress(BrokenPipeError):
             drive.stdin.write('{"order": "arm"}\n')
@@ -187,7 +187,7 @@ def _arm_again(drive: subprocess.Popen[str], said: dict[str, Any]) -> None:
 
 
 def _listen(drive: subprocess.Popen[str], said: dict[str, Any]) -> None:
-    """Keep the last of everything that the drive says."""
+    """Store the newest value of every field of the drive's output."""
     assert drive.stdout is not None
     for line in drive.stdout:
         fields = json.loads(line)
@@ -200,7 +200,7 @@ def _listen(drive: subprocess.Popen[str], said: dict[str, Any]) -> None:
 
 
 def virtual(seconds: float, cars: int, scenario: str) -> None:
-    """World, bytes, trackers, policy and gate under a counted clock."""
+    """Run world, bytes, trackers, policy and gate with a virtual clock."""
     sys.path[:0] = [str(TESTS), str(ROOT)]
     from virtual_drive import VirtualDrive
 

@@ -1,9 +1,9 @@
-"""Multidimensional scaling of each instant next to `joint`, on recordings.
+"""Comparison of `joint` with multidimensional scaling (MDS) of each instant, on recordings.
 
-The layout of an instant follows from the newest range of each pair alone, by classical MDS. Both
-are scored after the best rotation and reflection of each instant, which is all that ranges can
-tell. Run `python benchmarks/measure_mds.py`, which writes benchmarks/results/mds-results.jsonl,
-then `benchmarks/make_tables.py`.
+MDS computes the layout of an instant only from the newest range of each pair. Both are scored after
+the best rotation and reflection of each instant, which ranges do not determine. Run `python
+benchmarks/measure_mds.py`, which writes benchmarks/results/mds-results.jsonl, then
+`benchmarks/make_tables.py`.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from tracking.metrics.score import Score, score
 
 FILE = Path(__file__).parent / "results" / "mds-results.jsonl"
 SKIP = 10.0
-"""[s] Not scored."""
+"""[s] Time at the start that is not scored."""
 NEWEST = 3.0
-"""[-] A range counts for so many median periods of its pair."""
+"""[-] Largest age of a range in median periods of its pair."""
 LOGS = ("isas_walk1", "plaza2", "tiers_run01", "tiers_short", "murp_17")
 CONVERTED = {"tiers, test1 of case_4": ("tiers_ros2", "tiers"), "murp, trial 03": ("murp", "murp")}
-"""Name to the excerpt and the preset that reads it."""
+"""Name to the excerpt and its preset for conversion."""
 
 
 def distances(log: Log, times: F64) -> F64:
-    """Newest distance of each pair at some times, (time, node, node) [m]; NaN where unknown."""
+    """Return the newest distance of each pair, (time, node, node) [m]; NaN where unknown."""
     n = log.constellation.n_nodes
     block = log.block
     found = np.full((len(times), n, n), np.nan)
@@ -74,7 +74,7 @@ def score_mds(log: Log) -> Score:
 
 
 def line(name: str, log: Log) -> dict[str, Any]:
-    """Errors of both on one recording."""
+    """Return the errors of both methods on one recording."""
     mds, joint = score_mds(log), track_log(log, skip=SKIP, findings=()).score
     return {
         "case": name,

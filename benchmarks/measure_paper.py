@@ -1,8 +1,8 @@
-"""What each reading of the paper's text costs, for `docs/explanation/paper.md`.
+"""Effect of each interpretation of the paper's text, for `docs/explanation/paper.md`.
 
 `paper-ekf-mds` with one option changed at a time on the three cases of the paper suite; medians
-over the seeds. With "layout given" the first MDS is aligned to the true layout, which no filter
-knows: what the text leaves open about the start.
+over the seeds. With "layout given" the first MDS is aligned to the true layout, which is unknown to
+filters, since the text does not specify the initialisation.
 
 Run `python benchmarks/measure_paper.py [FIRST SEED] [SEEDS] [SECONDS]`; 0, 20 and 60 by default.
 """
@@ -38,11 +38,11 @@ READINGS: dict[str, tuple[str, dict[str, object], bool]] = {
     "alignment: none": ("paper-ekf-mds", {"alignment": "none"}, False),
     "scaling: fourth-root": ("paper-ekf-mds", {"scaling": "fourth-root"}, False),
 }
-"""Name to filter, options and whether the first layout is given."""
+"""Name to filter, options, and True if the first layout is given."""
 
 
 def track(log: Log, filter: str, params: PaperParams, given: bool) -> Score:
-    """Score one reading on one run."""
+    """Score one interpretation on one run."""
     constellation, (first, last) = log.constellation, log.t_range
     if given:
         pos, _ = log.truth.positions(constellation, np.array([first]))
@@ -58,7 +58,7 @@ def track(log: Log, filter: str, params: PaperParams, given: bool) -> Score:
 
 
 def main() -> None:
-    """Print a table for each case."""
+    """Print one table per case."""
     given = dict(enumerate(sys.argv[1:]))
     first, seeds, seconds = int(given.get(0, 0)), int(given.get(1, 20)), float(given.get(2, 60.0))
     for case in PAPER:

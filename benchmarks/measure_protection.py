@@ -1,7 +1,7 @@
-"""How often pairs that are OK are off by more than their protection radius.
+"""Share of samples in which pairs that are OK are off by more than their protection radius.
 
-Runs begin at any time of a minute's drive, walk or flight: the first 15 s after a start count, and
-a whole minute. Prints a line for each kind.
+The tracker starts at several times of a drive, walk or flight of one minute; the 15 s after each
+start are scored. Prints one line per kind.
 
 Run `python benchmarks/measure_protection.py [STARTS] [FIRST]`.
 """
@@ -21,22 +21,22 @@ from tracking.metrics.integrity import beyond_protection
 
 KINDS = ("cars-los", "cars-nlos", "human", "hand", "drones")
 PER_RUN = 10
-"""[-] Starts in each run."""
+"""[-] Starts per run."""
 LENGTH = 15.0
-"""[s]"""
+"""[s] Time after a start that is scored."""
 
 
 def started(of: Case, at: float) -> tuple[int, int]:
-    """OK samples of a tracker that begins at a time [s], and those beyond their radius."""
+    """Return the number of OK samples after a start at `at` [s], and of those beyond the radius."""
     t, kind = of.block.t[0], of.block.kind[0]
     block = of.block.take(((t >= at) | (kind == Kind.SURVEY)) & (t < at + LENGTH))
-    # Surveyed distances hold from the start on.
+    # Surveyed distances are valid from the start on.
     block = replace(block, t=np.where(block.kind == Kind.SURVEY, at, block.t))
     block = block.take(block.order()[0])
     times = (of.t >= at) & (of.t < at + LENGTH)
     who = of.constellation
     if of.heading is not None:
-        # What the constellation states is the heading at the start of the run, not here.
+        # The heading of the constellation is that at the start of the run.
         mover = replace(who.nodes[0], initial_heading=of.heading(at))
         who = replace(who, nodes=(mover, *who.nodes[1:]))
     estimate = Tracker(who).run(block, of.t[times]).take(0)

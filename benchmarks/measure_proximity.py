@@ -1,4 +1,4 @@
-"""What distance sensors do for consensus, for the table of `docs/reference/controllers.md`.
+"""Effect of distance sensors on consensus, for the table of `docs/reference/controllers.md`.
 
 Run `python benchmarks/measure_proximity.py`; some minutes.
 """

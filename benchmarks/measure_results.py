@@ -1,8 +1,8 @@
-"""Figures of the filters on simulated rooms and on recordings.
+"""Metrics of the filters on simulated rooms and on recordings.
 
-Run `relpos evaluate --seeds 50 --jobs 2 --out FOLDER`, then this script with the same folder,
-which adds the recordings and writes benchmarks/results/tracker-results.jsonl;
-`benchmarks/make_tables.py` makes the tables of that.
+Run `relpos evaluate --seeds 50 --jobs 2 --out FOLDER`, then this script with the same folder. It
+adds the recordings and writes benchmarks/results/tracker-results.jsonl, the input of
+`benchmarks/make_tables.py`.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ SUITE = (
     "case", "filter", "seeds", "paper", "rmse", "rmse_yaw", "rmse_shape", "bound_yaw",
     "bound_shape", "lost_runs", "ok_share", "integrity_share", "nees",
 )  # fmt: skip
-"""What is kept of a line of `relpos evaluate`."""
+"""Fields that are kept of a line of `relpos evaluate`."""
 RECORDING = "case", "from", "filter", "rmse", "rmse_yaw", "rmse_shape"
-"""The same of a recording."""
+"""Fields that are kept of a recording."""
 FIRST = (10.0, 20.0)
 """[s] Recordings are scored from these times on."""
 FILTERS = ("joint", "ekf-mds", "ekf")
 
 
 def suite_lines(folder: Path) -> list[dict[str, Any]]:
-    """Lines of the rooms of the paper, rounded."""
+    """Return the rounded lines of the rooms of the paper."""
     lines = [json.loads(line) for line in (folder / "results.jsonl").read_text().splitlines()]
     return [rounded(line, SUITE) for line in lines if "lost_runs" in line]
 
 
 def recording_lines() -> list[dict[str, Any]]:
-    """Lines of the recordings, those of an efficient estimator among them."""
+    """Return the lines of the recordings, those of an efficient estimator included."""
     lines = []
     for name in RECORDINGS:
         log, checked = examine(recording(name))
@@ -55,7 +55,7 @@ def recording_lines() -> list[dict[str, Any]]:
 
 
 def rounded(line: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
-    """Some of a line, numbers with five digits."""
+    """Return some fields of a line, numbers with five digits."""
     return {
         key: float(f"{line[key]:.5g}") if isinstance(line[key], float) else line[key]
         for key in keys

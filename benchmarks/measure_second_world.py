@@ -1,4 +1,4 @@
-"""The default filter in the second world (`tests/second_world`), which shares nothing with ours.
+"""The default filter in the second world (`tests/second_world`), an independent simulator.
 
 For `docs/benchmarks/tracker.md`: worlds are drawn at random and tracked: cars with the mounts of
 their trackers given, unknown, and labelled robots; hands, drones and bodies in space. The bound
@@ -37,7 +37,7 @@ KINDS: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def figures(seed: int, carrier: str, how: dict[str, Any]) -> list[float]:
-    """Errors, bounds, NEES, ok, ok and wrong, ok and within its accuracy, of one world."""
+    """Return errors and bounds [m], NEES, and shares ok, ok and wrong, ok and within accuracy."""
     world = draw(seed, kind=carrier)
     log = record(world, **how)
     result, bound = track_log(log, findings=[]), posterior_bound(log, matched(world))
@@ -52,7 +52,7 @@ def figures(seed: int, carrier: str, how: dict[str, Any]) -> list[float]:
 
 
 def main() -> None:
-    """Measure and write."""
+    """Measure all kinds and write the results."""
     given = [int(x) for x in sys.argv[1:]]
     n, first = [*given, *(100, 1000)[len(given) :]][:2]
     lines = []

@@ -1,4 +1,4 @@
-"""How a tracker does in space from nothing but raw sensors: hands next to fixed nodes, and drones.
+"""Accuracy of the tracker in space from raw sensors: hands next to fixed nodes, and drones.
 
 For `docs/benchmarks/tracker.md`; the runs are those of `space_runs.py`. Nothing of them is in a
 log, so filters can be compared on hundreds before a recording is looked at.
@@ -22,38 +22,38 @@ from tracking.geometry import quat_from_yaw, rotate
 from tracking.metrics.score import score
 
 SKIP, SETTLED = 10.0, 30.0
-"""[s] Not scored; from where on a run is scored once more."""
+"""[s] Time at the start that is not scored; start of the second score."""
 WRONG = 0.5
-"""[m] A pair that is off by more, after the constant yaw of its run, is wrong."""
+"""[m] Position error after the constant yaw of the run above which a pair is wrong."""
 TO_A_METRE = TrackerParams(filter=FilterParams(joint=JointParams(accuracy=1.0)))
-"""Drones rarely expect to be within the usual half metre."""
+"""Accuracy of 1 m for status ok; the expected error of drones is rarely below the default."""
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What came of a run."""
+    """Results of one run."""
 
     seed: int
     rmse_yaw: float
-    """From 10 s on [m]."""
+    """[m] Error after one constant yaw, from 10 s on."""
     rmse_shape: float
-    """[m]"""
+    """[m] Error after the best rotation at each instant, from 10 s on."""
     settled_yaw: float
-    """From 30 s on [m]."""
+    """[m] Error after one constant yaw, from 30 s on."""
     settled_shape: float
-    """[m]"""
+    """[m] Error after the best rotation at each instant, from 30 s on."""
     first_ok: float
-    """When all pairs with a node that moves were ok first; infinite if never [s]."""
+    """[s] First time when all pairs with a moving node were ok; infinite if never."""
     ok: float
-    """Share of pairs and time."""
+    """[-] Share of pairs and time with status ok."""
     ok_but_wrong: float
-    """The same, of those that are wrong."""
+    """[-] Share of pairs and time with status ok and a wrong position."""
     nees: float
-    """From 30 s on, per degree of freedom."""
+    """[-] NEES per degree of freedom, from 30 s on."""
 
 
 def judge(run: Run, seed: int, filter: str = "joint") -> Judged:
-    """Track a run and compare it with the truth."""
+    """Track a run and compare it with ground truth."""
     pairs, t = run.constellation.pairs, np.arange(0.5, SECONDS - 0.1, 0.1)
     estimate = Tracker(run.constellation, TO_A_METRE, filter=filter).run(run.block, t).take(0)
     where = run.positions(t)
@@ -78,7 +78,7 @@ def judge(run: Run, seed: int, filter: str = "joint") -> Judged:
 
 
 def summary(runs: list[Judged]) -> dict[str, float]:
-    """Medians, means where single runs count, and runs that are off by more than a metre."""
+    """Return medians, means of outlier-sensitive metrics, and the number of runs off by > 1 m."""
     of = {k: np.array([getattr(r, k) for r in runs], dtype=np.float64) for k in Judged.__slots__}
     medians = ("rmse_yaw", "rmse_shape", "settled_yaw", "settled_shape", "first_ok", "nees")
     return (

@@ -1,11 +1,11 @@
-"""How soon a tracker that begins in the middle of a recording knows where everybody is.
+"""Convergence of a tracker that starts in the middle of a recording.
 
 For `docs/benchmarks/tracker.md`: a recording is cut at many places, and the tracker knows
 nothing of what was before; for half a minute each it is judged as `relpos track` does, from ten
 seconds on.
 
-Run `python benchmarks/measure_starts.py FOLDER [EVERY] [FILTER]`, with a log folder that has a
-truth and the time between two starts [s], 4 if not given.
+Run `python benchmarks/measure_starts.py FOLDER [EVERY] [FILTER]`, with a log folder that has ground
+truth and the time between two starts [s], 4 by default.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ from tracking.log import Log, read_log
 from tracking.metrics.score import score
 
 SECONDS, SKIP = 30.0, 10.0
-"""[s] Length of what is tracked; not scored."""
+"""[s] Length of a run; time at its start that is not scored."""
 WRONG = 0.5
-"""[m] A pair that is off by more, after the constant yaw of this start, is wrong."""
+"""[m] Position error after the constant yaw of the run above which a pair is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """What came of one start."""
+    """Results of one start."""
 
     at: float
-    """[s] In the time of the recording."""
+    """[s] Start in the time of the recording."""
     rmse_yaw: float
-    """From 10 to 30 s [m]."""
+    """[m] Error after one constant yaw, from 10 to 30 s."""
     rmse_shape: float
-    """[m]"""
+    """[m] Error after the best rotation at each instant, from 10 to 30 s."""
     first_ok: float | None
-    """Until all pairs with a node that moves were ok; None if never [s]."""
+    """[s] Time until all pairs with a moving node were ok; None if never."""
     ok: float
-    """Share of the pairs and of the 30 s."""
+    """[-] Share of pairs and time with status ok."""
     ok_but_wrong: float
-    """The same, of those that are wrong."""
+    """[-] Share of pairs and time with status ok and a wrong position."""
 
 
 def begin(log: Log, at: float, filter: str) -> Begun:
-    """Track from a time of the recording on."""
+    """Track a recording from a time on."""
     constellation, every = log.constellation, log.block.t[0]
     block = log.block.take(slice(*np.searchsorted(every, [at, at + SECONDS]).tolist()))
     t = log.truth.times()
@@ -70,7 +70,7 @@ def begin(log: Log, at: float, filter: str) -> Begun:
 
 
 def summary(starts: list[Begun]) -> dict[str, float]:
-    """Medians, and how often it was wrong of what it was sure of."""
+    """Return medians of the errors and means of the shares."""
     of = {k: np.array([getattr(s, k) for s in starts], dtype=np.float64) for k in Begun.__slots__}
     first = np.nan_to_num(of["first_ok"], nan=np.inf)
     return {

@@ -1,11 +1,11 @@
-"""Measure the simulated motion that no parameter states, for `relpos_env.core.oracle_params`.
+"""Measure properties of the simulation without parameters, for `relpos_env.core.oracle_params`.
 
-How often a pair of cars loses sight of each other and gets it back, the scatter of power gaps, and
-how fast rear axles slip beyond what the filter foresees. Slip lasts, and the filter takes what it
-is told for white noise 20 times a second; so it is stated as that white noise whose means over
-some seconds are as large.
+Rates of transitions between LOS and NLOS of pairs of cars, standard deviation of power differences,
+and slip of rear axles that the filter does not model. Slip is correlated in time, but the filter
+models it as white noise at 20 Hz; it is therefore reported as the white noise with the same
+variance of its means over some seconds.
 
-Run `python benchmarks/measure_world.py [SCENARIO] [FIRST SEED] [DRIVES]`; a second a drive.
+Run `python benchmarks/measure_world.py [SCENARIO] [FIRST SEED] [DRIVES]`; one second per drive.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from tracking.measurements import Kind
 
 SECONDS = 120.0
 PERIOD = 0.05
-"""[s] Between two uses of what is known about carriers."""
+"""[s] Period of motion constraints in the filter."""
 SPANS = 0.05, 0.5, 2.0, 8.0
-"""[s] Over which slips are averaged."""
+"""[s] Averaging times of slip."""
 
 
 def sight(log: Log) -> tuple[np.ndarray, np.ndarray]:
-    """What ranges tell of sight.
+    """Return LOS statistics of the ranges of all pairs.
 
     Returns:
-        Time in sight and not [s], sights lost and sights found, of all pairs, (4,); power gaps
-        and whether they are of ranges in sight, (range, 2) [dB].
+        Time in LOS and NLOS [s], transitions to NLOS and to LOS, (4,); power difference [dB] and
+        1 for LOS, (range, 2).
     """
     is_range = log.block.kind[0] == Kind.RANGE
     t, i, j, values = (
@@ -53,7 +53,7 @@ def sight(log: Log) -> tuple[np.ndarray, np.ndarray]:
 
 
 def slips(log: Log) -> list[np.ndarray]:
-    """Mean sideways speed less that of the mount that fits each car, by length of time [m/s]."""
+    """Return mean lateral speeds after fitting the mount of each car, by `SPANS` [m/s]."""
     out: list[list[np.ndarray]] = [[] for _ in SPANS]
     for node in range(log.constellation.n_nodes):
         row = log.truth.node == node
@@ -72,7 +72,7 @@ def slips(log: Log) -> list[np.ndarray]:
 
 
 def main() -> None:
-    """Print what was measured."""
+    """Print the measured properties."""
     given = dict(enumerate(sys.argv[1:]))
     name, first = given.get(0, "cars-nlos"), int(given.get(1, 7000))
     total, gaps, rests = np.zeros(4), [], []

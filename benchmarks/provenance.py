@@ -1,9 +1,9 @@
-"""Where results and figures come from, and which of them are older than their code.
+"""Provenance of results and figures, and detection of those older than their code.
 
-`results/provenance.json` has an entry for every file of results, every picture of the documents and
-every card of a policy: the command that made it, version, commit, date and machine, and a hash of
-the code that it depends on. Run `python benchmarks/provenance.py` to list what is stale, with
-`--stamp FILE ...` after files have been made again.
+`results/provenance.json` has an entry for every file of results, every figure of the documents and
+every model card: the command that made it, version, commit, date and machine, and a hash of the
+code that it depends on. Run `python benchmarks/provenance.py` to list stale files, with
+`--stamp FILE ...` after files have been regenerated.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def code_hash(sources: list[str], root: Path = ROOT) -> str:
 
 @cache
 def _code(text: str) -> str:
-    """Return a Python text without comments and docstrings, which change no figure."""
+    """Return Python code without comments and docstrings, which do not affect results."""
     tree = ast.parse(text)
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
@@ -63,7 +63,7 @@ def stale(entries: dict[str, Entry], root: Path = ROOT) -> list[str]:
 
 
 def stamp(entries: dict[str, Entry], names: list[str]) -> None:
-    """Note that some files have been made with the code as it is.
+    """Record that files were made with the current code.
 
     Raises:
         KeyError: A file has no entry: add one with its command and sources.

@@ -1,8 +1,8 @@
 """Simulated runs in space with raw sensors: a hand next to fixed nodes, and a swarm of drones.
 
-For `measure_space.py`: half of the runs begin at rest, the others in mid-walk or mid-flight; rooms
-are of 5 m, sensors cheap or good, ranges err by 3 to 10 cm that last, and a tenth of them has no
-sight.
+For `measure_space.py`: half of the runs begin at rest, the others in motion; rooms are about 5 m
+long, sensors cheap or good, ranges have correlated errors of 3 to 10 cm, and a tenth of them is
+NLOS.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from tracking.measurements import Kind, MeasurementBlock
 SECONDS = 60.0
 """[s] Length of a run."""
 BEFORE = 5.0
-"""[s] What moves at the start has done so for this long."""
+"""[s] Time of motion before the start, for nodes that start in motion."""
 SIZE = np.array([1.8, 2.3])
-"""[m] Half the length and width of the room that is moved in."""
+"""[m] Half the length and width of the area of motion."""
 STEPS = 2.0 * np.pi * 1.8
-"""[rad/s] Of somebody who walks."""
+"""[rad/s] Step frequency of a walking person."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +35,17 @@ class Sensors:
     """Standard deviations of an IMU's errors, per axis."""
 
     offset: float
-    """Of the accelerometer [m/s2]."""
+    """[m/s2] Constant offset of the accelerometer."""
     accel: float
-    """Of a sample of it [m/s2]."""
+    """[m/s2] Noise of an accelerometer sample."""
     bias: float
-    """Of the gyroscope [deg/s]."""
+    """[deg/s] Constant bias of the gyroscope."""
     gyr: float
-    """Of a sample of it [deg/s]."""
+    """[deg/s] Noise of a gyroscope sample."""
     scale: float = 0.005
-    """Of both scales [-]."""
+    """[-] Scale errors of both sensors."""
     vibration: float = 0.1
-    """Of a sample of the acceleration, in motion [m/s2]."""
+    """[m/s2] Vibration in an accelerometer sample, in motion."""
 
 
 CHEAP, GOOD = Sensors(0.2, 0.04, 0.5, 0.6), Sensors(0.05, 0.02, 0.1, 0.1)
@@ -53,27 +53,27 @@ CHEAP, GOOD = Sensors(0.2, 0.04, 0.5, 0.6), Sensors(0.05, 0.02, 0.1, 0.1)
 
 @dataclass(frozen=True)
 class Mover:
-    """Where something is and how it is turned, at any time."""
+    """Position and orientation of a moving node as functions of time."""
 
     path: CubicSpline
     turns: RotationSpline
     rest: float
-    """[s] When it begins to move; below 0 if it has long."""
+    """[s] Start of motion; negative if already in motion."""
     gait: float
-    """[m] How much it goes up and down with every step."""
+    """[m] Amplitude of the vertical motion of steps."""
 
     def moves(self, t: F64) -> F64:
-        """0 at rest, 1 in motion, (time)."""
+        """Return 0 at rest, 1 in motion, (time,)."""
         return 1.0 / (1.0 + np.exp(-np.clip((t - self.rest - 0.5) / 0.2, -50.0, 50.0)))
 
     def position(self, t: F64) -> F64:
-        """(time, 3) [m]."""
+        """Return the positions, (time, 3) [m]."""
         p = self.path(t)
         p[:, 2] += self.gait * self.moves(t) * np.sin(STEPS * t)
         return np.asarray(p)
 
     def imu(self, t: F64, sensors: Sensors, rng: np.random.Generator) -> F64:
-        """Gyroscope [rad/s] and specific force [m/s2] with their errors, (time, 6)."""
+        """Return angular rate [rad/s] and specific force [m/s2] with errors, (time, 6)."""
         accel = self.path(t, 2)
         accel[:, 2] += GRAVITY - self.gait * STEPS**2 * self.moves(t) * np.sin(STEPS * t)
         force = self.turns(t).inv().apply(accel)
@@ -88,7 +88,7 @@ class Mover:
 
 
 def make_mover(rng: np.random.Generator, *, flies: bool) -> Mover:
-    """Somebody who walks about with a tracker in his hand, or a drone."""
+    """Return a walking person with a tracker in one hand, or a drone."""
     rest = float(rng.uniform(2.0, 8.0)) if rng.random() < 0.5 else -BEFORE
     low = 0.0 if flies else float(rng.choice([0.0, 0.8, 1.0]))
     z = low if rest > 0.0 else 1.0
@@ -121,28 +121,28 @@ def make_mover(rng: np.random.Generator, *, flies: bool) -> Mover:
 
 @dataclass(frozen=True)
 class Run:
-    """What a tracker is given, and where everybody was."""
+    """Measurements of a run, with ground truth."""
 
     constellation: Constellation
     block: MeasurementBlock
     positions: Callable[[F64], F64]
-    """Of all nodes at given times, (time, node, 3) [m]."""
+    """Positions of all nodes at given times, (time, node, 3) [m]."""
     heading: Callable[[float], float] | None = None
-    """Of the first node at a time [rad], where the world begins with its heading."""
+    """Heading of the first node at a time [rad], if it defines the world frame."""
 
 
 def make_ranges(
     rng: np.random.Generator, t: F64, pair: F64, ends: F64, slow: float, white: float
 ) -> F64:
-    """Ranges whose errors last for 1.5 m, and now and then have no sight, (range) [m].
+    """Simulate ranges with errors correlated over 1.5 m, and with NLOS, (range,) [m].
 
     Args:
         rng: Generator.
-        t: Times, (range) [s].
-        pair: Which pair, (range).
-        ends: From one end to the other, (range, 3) [m].
-        slow: Standard deviation of what lasts [m].
-        white: Of what does not [m].
+        t: Times, (range,) [s].
+        pair: Index of the pair, (range,).
+        ends: Vectors between the antennas, (range, 3) [m].
+        slow: Standard deviation of the correlated error [m].
+        white: Standard deviation of the white error [m].
     """
     z = np.linalg.norm(ends, axis=1) + rng.normal(0.0, white, len(t))
     for p in np.unique(pair):
@@ -161,7 +161,7 @@ def make_ranges(
 
 
 def hand(seed: int) -> Run:
-    """One node in a hand among four to eight fixed ones whose distances are surveyed."""
+    """Simulate a hand-held node among four to eight fixed nodes with surveyed distances."""
     rng = np.random.default_rng(seed)
     sensors, hz = (CHEAP, GOOD)[rng.integers(2)], float(rng.choice([80.0, 100.0]))
     n, mover = int(rng.integers(4, 9)), make_mover(rng, flies=False)
@@ -207,7 +207,7 @@ def hand(seed: int) -> Run:
 
 
 def drones(seed: int) -> Run:
-    """Five drones with magnetometers in one room, 150 ranges a second."""
+    """Simulate five drones with magnetometers in one room, 150 ranges per second."""
     rng, n, hz = np.random.default_rng(seed), 5, 100.0
     movers = [make_mover(rng, flies=True) for _ in range(n)]
     nodes = tuple(NodeConfig(id=k, vehicle="drone", imu_hz=hz, mag_hz=25.0) for k in range(n))

@@ -1,7 +1,7 @@
-"""What the shipped policies reach with the code as it is, onto their cards.
+"""Update of the results in the model cards of the shipped policies.
 
-Run `relpos compare` for each of them, then `python benchmarks/write_cards.py RESULTS ...` with the
-results.jsonl of all comparisons. A policy that is in none of them keeps its card.
+Run `relpos compare` for each policy, then `python benchmarks/write_cards.py RESULTS ...` with the
+results.jsonl of all comparisons. Policies without results keep their cards.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from agents.policies.write import write_policy
 
 
 def main(files: list[Path]) -> None:
-    """Write the cards and say which."""
+    """Write the model cards and print their names."""
     rows = [json.loads(line) for file in files for line in file.read_text().splitlines()]
     for name in shipped_names():
         # Lines of single episodes have no number of episodes.

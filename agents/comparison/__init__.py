@@ -1,1 +1,1 @@
-"""Controllers and policies compared: the same seeds, many scenarios, what each of them sees."""
+"""Comparison of controllers and policies on the same seeds, by scenario and observation mode."""

@@ -1,4 +1,4 @@
-"""Arguments of comparisons, checked."""
+"""Validation of the arguments of comparisons."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from relpos_env.errors import EnvError
 from relpos_env.interface.observations import observation_mode
 
 SHORTEST, LONGEST = 0.1, 3600.0
-"""[s]"""
+"""[s] Limits of the length of an episode."""
 MOST_EPISODES = 10_000
 
 Name = TypeVar("Name")
 
 
 def modes(names: Sequence[str]) -> list[str]:
-    """Modes of observations as they were named, each once.
+    """Return the observation modes in order, without duplicates.
 
     Raises:
-        UsageError: No such mode, or none at all.
+        UsageError: A mode does not exist, or there is none.
     """
     chosen = each_once("--observation", names)
     try:
@@ -32,10 +32,10 @@ def modes(names: Sequence[str]) -> list[str]:
 
 
 def each_once(option: str, names: Sequence[Name]) -> list[Name]:
-    """Names in order.
+    """Return the names in order, without duplicates.
 
     Raises:
-        UsageError: None at all; the option is named.
+        UsageError: There are no names; the message contains the option.
     """
     chosen = list(dict.fromkeys(names))
     if not chosen:
@@ -44,10 +44,10 @@ def each_once(option: str, names: Sequence[Name]) -> list[Name]:
 
 
 def check_numbers(episodes: int, first_seed: int, seconds: float, settle: float) -> None:
-    """See that numbers are in range.
+    """Check the ranges of numbers.
 
     Raises:
-        UsageError: One is not; the option is named.
+        UsageError: A number is out of range; the message contains the option.
     """
     if not 1 <= episodes <= MOST_EPISODES:
         raise UsageError(f"--episodes: expected 1 to {MOST_EPISODES}, got {episodes}")

@@ -1,4 +1,4 @@
-"""Observations without the others: what a car sees that knows no other."""
+"""Masking of the other cars in observations."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from relpos_env.interface.observations.base import F32
 from relpos_env.interface.observations.standard_fields import own_fields, wish_fields
 
 KEPT = {f.name for f in (*wish_fields(1), *own_fields(1))}
-"""What is asked of a car and what it knows of itself."""
+"""Names of the fields of targets and of the car's own state."""
 
 
 class Blindfold:
-    """Takes from observations what they tell of the others."""
+    """Masks the fields of the other cars in observations."""
 
     def __init__(self, layout: Layout) -> None:
-        """Find the places.
+        """Find the fields to be masked.
 
         Args:
-            layout: Of the observations.
+            layout: Layout of the observations.
         """
         kept = np.concatenate([np.full(f.size, f.name in KEPT) for f in layout.fields])
         self._kept = np.tile(kept, layout.history)
         self._nobody = layout.alone()
 
     def __call__(self, observations: F32) -> F32:
-        """The same, but no other car is known, (..., size)."""
+        """Return the observations without estimates of other cars, (..., size)."""
         blind: F32 = np.where(self._kept, observations, self._nobody)
         return blind

@@ -1,4 +1,4 @@
-"""Drivers on observations in scenarios: what `relpos compare` does, as a function."""
+"""Comparison of drivers (controllers and policies) by simulation (`relpos compare`)."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from agents.simulation.demo import SETTLE
 from relpos_env.interface.beams import MOST_BEAMS
 
 FIRST_SEED = 1000
-"""Of the first episode. Training draws its own at random from 2^30 numbers."""
+"""Seed of the first episode. Training draws its seeds at random from 2^30 numbers."""
 BATCH = 10
-"""[-] Episodes that a process runs side by side."""
+"""[-] Episodes per batch of a process."""
 
 
 def compare(
@@ -43,37 +43,37 @@ def compare(
     address: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> CompareResult:
-    """Let every driver drive on every mode of observations in every scenario, on the same seeds.
+    """Evaluate every driver on every observation mode in every scenario, on the same seeds.
 
-    What a driver cannot see is left out and noted. With more than one job the calling script
-    must be importable: its work belongs below `if __name__ == "__main__"`.
+    Incompatible combinations are omitted and listed in `notes`. With more than one job the calling
+    script must be importable: put its code below `if __name__ == "__main__"`.
 
     Args:
         drivers: Controllers of `agents.controllers.CONTROLLERS`, and policies as for
             `agents.policies.load_policy`.
-        observations: Of `relpos_env.interface.observations.OBSERVATIONS`.
-        scenarios: Of `relpos_env.scenarios.SCENARIOS`, or TOML files; None is that of the task.
+        observations: Modes of `relpos_env.interface.observations.OBSERVATIONS`.
+        scenarios: Names of `relpos_env.scenarios.SCENARIOS` or TOML files; None for the task's own.
         task: One of `relpos_env.tasks.TASKS`.
-        task_options: The task's own options, by name.
-        cars: Slots for cars; by default as many as the scenario can have.
-        level: Randomisation of a level of the curriculum, 0 to 4.
-        operator: Share of episodes with an operator; in the others cars follow the plan alone,
-            as real cars without a remote control do.
-        proximity: Beams that measure distances round each car; by default those that each policy
-            was trained with, and of controllers as many as any policy has, or none.
-        episodes: Of each driver, mode and scenario, seeds from `first_seed` on.
+        task_options: Options of the task, by name.
+        cars: Slots for cars; by default the maximum of the scenario.
+        level: Curriculum level of the randomisation, 0 to 4.
+        operator: Share of episodes with an operator; in the others cars only follow the plan, as
+            real cars without a remote control do [-].
+        proximity: Distance sensors per car; by default those that each policy was trained with,
+            and for controllers the maximum of all policies, or none.
+        episodes: Episodes per driver, mode and scenario.
         first_seed: Seed of the first episode.
-        seconds: Length of an episode [s], less where the task is done before.
-        settle: Errors are scored from here on [s].
-        jobs: Processes at a time. No figure depends on it.
+        seconds: Length of an episode, shorter if the task is accomplished [s].
+        settle: Time from which errors are scored [s].
+        jobs: Parallel processes; the results do not depend on it.
         engine: One of `agents.jobs.ENGINES`.
-        address: Of a cluster that runs, see `agents.jobs.find_engine`.
-        progress: Called with the share done, 0 to 1.
+        address: Address of a running cluster, see `agents.jobs.find_engine`.
+        progress: Called with the completed share, 0 to 1.
 
     Raises:
-        UsageError: A name that is not known, a number out of range, nothing left to compare;
-            the option is named.
-        EnvError: A scenario, task or number of cars that does not exist or fit.
+        UsageError: A name is unknown, a number out of range, or no combination can be compared;
+            the message contains the option.
+        EnvError: The scenario or task does not exist, or the number of cars does not fit.
     """
     check_numbers(episodes, first_seed, seconds, settle)
     if not 0.0 <= operator <= 1.0:
@@ -127,7 +127,7 @@ def compare(
 def _who_can(
     contenders: Sequence[Contender], settings: Sequence[Setting]
 ) -> tuple[list[Row], list[str]]:
-    """Rows without episodes of all who can drive, and why the others cannot."""
+    """Return rows without episodes of the compatible candidates, and notes on the others."""
     rows: list[Row] = []
     refused: dict[tuple[str, str], list[str]] = {}
     for setting in settings:

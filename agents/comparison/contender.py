@@ -1,4 +1,4 @@
-"""Who is compared: a driver by its name, and what it is shown."""
+"""Candidates of a comparison: a driver, found by its name, and its observation mode."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from relpos_env.interface.observations import observation_mode
 
 
 class Entry(Protocol):
-    """What the name of a driver stands for."""
+    """Source of a driver: a controller or a trained policy."""
 
     @property
     def title(self) -> str:
-        """For tables and records."""
+        """Name in tables and records."""
 
     @property
     def trained_on(self) -> str | None:
@@ -29,22 +29,22 @@ class Entry(Protocol):
 
     @property
     def history(self) -> int:
-        """So many observations it sees in one."""
+        """Number of stacked observations."""
 
     @property
     def proximity(self) -> int | None:
-        """Beams that it was trained with, None if it was not trained."""
+        """Distance sensors that it was trained with, None if it was not trained."""
 
     def refusal(self, observation: str, n_cars: int, proximity: int) -> str | None:
-        """Why it cannot drive so many cars on a mode of observations; None if it can."""
+        """Return the reason for an incompatible mode or number of cars; None if compatible."""
 
     def driver(self, observation: str, n_cars: int, proximity: int) -> Driver:
-        """The driver of so many cars on a mode of observations."""
+        """Return the driver for an observation mode and a number of cars."""
 
 
 @dataclass(frozen=True, slots=True)
 class ControllerEntry:
-    """A controller: it takes the stretches that an observation has, whatever they are."""
+    """A controller, which adapts to the fields of the observation."""
 
     title: str
     trained_on: None = None
@@ -52,7 +52,7 @@ class ControllerEntry:
     proximity: None = None
 
     def refusal(self, observation: str, n_cars: int, proximity: int) -> str | None:
-        """A mode in which it cannot read what it needs."""
+        """Return the fields that the mode lacks, as text; None if the mode is compatible."""
         try:
             self.driver(observation, n_cars, proximity)
         except UsageError as error:
@@ -60,16 +60,16 @@ class ControllerEntry:
         return None
 
     def driver(self, observation: str, n_cars: int, proximity: int) -> Driver:
-        """The controller of one mode."""
+        """Return the controller for an observation mode."""
         fields = observation_mode(observation, n_cars, proximity).fields
         return controller_builder(self.title)(fields)
 
 
 def find_controller(name: str) -> Entry | None:
-    """A controller of that name, if there is one.
+    """Return the controller of a name, None if there is none.
 
     Raises:
-        UsageError: ``package.module:Name`` of what cannot be imported.
+        UsageError: ``package.module:Name`` cannot be imported.
     """
     try:
         controller_builder(name)
@@ -81,19 +81,18 @@ def find_controller(name: str) -> Entry | None:
 
 
 SOURCES: tuple[Callable[[str], Entry | None], ...] = (find_controller, find_trained)
-"""Where drivers come from, asked one after the other; each gives None for names it does not
-know."""
+"""Lookup functions, called in order; each returns None for unknown names."""
 
 
 def find_entry(name: str) -> Entry:
-    """What a name stands for.
+    """Return the source of the driver of a name.
 
     Args:
         name: One of `agents.controllers.CONTROLLERS`, or a policy as for
             `agents.policies.load_policy`.
 
     Raises:
-        UsageError: Nothing, or a policy that cannot be used.
+        UsageError: The name is unknown, or the policy cannot be used.
     """
     for find in SOURCES:
         entry = find(name)
@@ -105,51 +104,51 @@ def find_entry(name: str) -> Entry:
 
 @dataclass(frozen=True, slots=True)
 class Contender:
-    """A driver and what it is shown."""
+    """A driver and its observations."""
 
     name: str
-    """What `find_entry` knows it by."""
+    """Name for `find_entry`."""
     observation: str
     """One of `relpos_env.interface.observations.OBSERVATIONS`."""
     title: str = ""
-    """What tables call the driver; by default its name."""
+    """Name of the driver in tables; `name` if empty."""
     proximity: int = 0
-    """Beams that measure distances round each car."""
+    """Number of distance sensors around each car."""
 
     @property
     def called(self) -> str:
-        """The driver, for tables and records."""
+        """Name of the driver in tables and records."""
         return self.title or self.name
 
     @property
     def sees(self) -> str:
-        """What it is shown, for tables."""
+        """Label of the observations for tables."""
         return sees(self.observation, self.proximity)
 
     @property
     def label(self) -> str:
-        """Driver and observations, for tables and pictures."""
+        """Label of driver and observations for tables and pictures."""
         return f"{self.called} on {self.sees}"
 
 
 def sees(observation: str, proximity: int) -> str:
-    """A mode and its beams, for tables."""
+    """Return the label of an observation mode and its distance sensors for tables."""
     return f"{observation}, {proximity} beams" if proximity else observation
 
 
 def line_up(
     names: Sequence[str], observations: Sequence[str], proximity: int | None = None
 ) -> list[Contender]:
-    """Every driver on every mode of observations.
+    """Return every combination of driver and observation mode.
 
     Args:
-        names: See `find_entry`.
-        observations: Of `relpos_env.interface.observations.OBSERVATIONS`.
-        proximity: Beams of all of them; by default each policy has its own, and controllers as
-            many as any policy.
+        names: Names of drivers, see `find_entry`.
+        observations: Modes of `relpos_env.interface.observations.OBSERVATIONS`.
+        proximity: Distance sensors of all candidates; by default those that each policy was
+            trained with, and for controllers the maximum of all policies.
 
     Raises:
-        UsageError: A name stands for nothing.
+        UsageError: A name is unknown.
     """
     entries = [find_entry(name) for name in names]
     titles = [entry.title for entry in entries]
@@ -159,7 +158,7 @@ def line_up(
         for entry in entries
     ]
     return [
-        # Drivers of the same title are told apart by what they were asked for as.
+        # Drivers with the same title are shown with their names instead.
         Contender(name, observation, title if titles.count(title) == 1 else name, n)
         for name, title, n in zip(names, titles, beams, strict=True)
         for observation in observations

@@ -1,4 +1,4 @@
-"""An episode of real cars as a comparison reads it: by what the cars believe."""
+"""Episodes of real cars for a comparison, measured by the tracker's estimates."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from tracking.arrays import F64, Bool
 
 
 class Driven:
-    """A group of real cars as a `agents.comparison.meter.Running` of one environment."""
+    """A group of real cars as an `agents.comparison.meter.Running` of one environment."""
 
     def __init__(self, env: HardwareFormationEnv, cycles: int) -> None:
-        """Begin an episode: the cars are armed and find each other first.
+        """Begin an episode after the cars are armed and their tracker has converged.
 
         Args:
-            env: The cars.
-            cycles: Decisions of an episode.
+            env: Environment of the real cars.
+            cycles: Control steps of an episode.
 
         Raises:
             BridgeError: The cars could not be armed.
@@ -32,59 +32,59 @@ class Driven:
 
     @property
     def observations(self) -> F32:
-        """What the cars see, (1, car, size)."""
+        """Observations of the cars, (1, car, size)."""
         return self._group.observations
 
     @property
     def present(self) -> Bool:
-        """Who is heard, (1, car)."""
+        """True for cars that are received, (1, car)."""
         return self._group.believed.present
 
     @property
     def speed(self) -> F64:
-        """By the odometers, (1, car) [m/s]."""
+        """Odometer speed, (1, car) [m/s]."""
         speed: F64 = np.abs(self._group.swarm.view.speed)
         return speed
 
     @property
     def error(self) -> F64:
-        """Formation error that the cars believe in, (1, car) [m]."""
+        """Formation error by the estimates, (1, car) [m]."""
         return self._group.task.error
 
     @property
     def place_error(self) -> F64:
-        """Not known."""
+        """Not measurable on hardware; NaN, (1,)."""
         return self._unknown[:, 0]
 
     @property
     def tracking_error(self) -> F64:
-        """Not known."""
+        """Not measurable on hardware; NaN, (1, car)."""
         return self._unknown
 
     @property
     def collisions(self) -> F64:
-        """Not known."""
+        """Not measurable on hardware; NaN, (1, car)."""
         return self._unknown
 
     @property
     def clearance(self) -> F64:
-        """Not known."""
+        """Not measurable on hardware; NaN, (1, car)."""
         return self._unknown
 
     @property
     def done(self) -> Bool:
-        """Whether the task is accomplished, as the cars believe, (1)."""
+        """True if the task is accomplished by the estimates, (1,)."""
         return self._group.task.done
 
     @property
     def over(self) -> Bool:
-        """Whether the episode has ended, (1)."""
+        """True if the episode has ended, (1,)."""
         return self._group.terminated | self._group.truncated
 
     def step(self, actions: F32) -> None:
-        """One decision of all cars, in real time; see `Running`."""
+        """Run one control step of all cars in real time; see `Running`."""
         self._group.step(*self._actions.decode(actions, "actions"))
 
     def close(self) -> None:
-        """Let the cars stand."""
+        """Stop the cars."""
         self._env.close()

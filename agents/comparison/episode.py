@@ -1,7 +1,7 @@
-"""Episodes of one contender in one setting, a batch at a time.
+"""Batches of episodes of one candidate in one setting.
 
-Law: the figures of a simulated episode follow from contender, setting and seed alone, bit for
-bit; neither the episodes next to it in the batch nor the number of jobs change them.
+Invariant: the metrics of a simulated episode depend only on candidate, setting and seed, bit for
+bit, not on the other episodes of the batch or the number of jobs.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from agents.simulation.frames import FrameRecorder
 def run_episodes(
     contender: Contender, setting: Setting, seeds: Sequence[int]
 ) -> list[EpisodeResult]:
-    """Drive one simulated episode for each seed, side by side.
+    """Run one simulated episode for each seed, in one batch.
 
     Args:
-        contender: Drives all cars.
-        setting: Where.
-        seeds: Of the episodes.
+        contender: Candidate that drives all cars.
+        setting: Scenario and task.
+        seeds: Seeds of the episodes.
 
     Raises:
-        EnvError: The setting makes no sense.
-        UsageError: No driver of that name.
+        EnvError: The setting is invalid.
+        UsageError: The driver does not exist.
     """
     simulated, driver = _begin(contender, setting, seeds)
     results = measure(simulated, driver, seeds, setting.first_scored)
@@ -46,14 +46,14 @@ def measure(
     first_scored: int,
     after: Callable[[], None] | None = None,
 ) -> list[EpisodeResult]:
-    """Drive episodes to their ends.
+    """Run episodes to their ends and measure them.
 
     Args:
-        running: Simulated or real, just begun.
-        driver: Of all cars.
-        seeds: Of the episodes.
-        first_scored: Number of the first decision whose errors count.
-        after: Called after every decision.
+        running: Simulated or real episodes that have just begun.
+        driver: Driver of all cars.
+        seeds: Seeds of the episodes.
+        first_scored: Index of the first control step whose errors are scored.
+        after: Called after every control step.
     """
     meter = Meter(running)
     while meter.going.any():
@@ -65,18 +65,18 @@ def measure(
 
 
 def decide(running: Running, driver: Driver) -> None:
-    """One decision of all cars."""
-    # One environment at a time: sums over a batch may be rounded otherwise than alone.
+    """Run one control step of all cars."""
+    # One environment at a time: rounding of sums may depend on the batch size.
     running.step(np.stack([driver.act(seen) for seen in running.observations]))
 
 
 def film_episode(contender: Contender, setting: Setting, seed: int) -> dict[str, Any]:
-    """Frames of one simulated episode for the animation, see `agents.simulation.frames`.
+    """Return the animation frames of one simulated episode, see `agents.simulation.frames`.
 
     Args:
-        contender: Drives all cars.
-        setting: Where.
-        seed: Of the episode.
+        contender: Candidate that drives all cars.
+        setting: Scenario and task.
+        seed: Seed of the episode.
     """
     simulated, driver = _begin(contender, setting, [seed])
     recorder = FrameRecorder(simulated.formation)
@@ -90,7 +90,7 @@ def film_episode(contender: Contender, setting: Setting, seed: int) -> dict[str,
 def _begin(
     contender: Contender, setting: Setting, seeds: Sequence[int]
 ) -> tuple[Simulated, Driver]:
-    """Environments with an episode each, and who drives in them."""
+    """Return environments with one episode each, and the driver of all cars."""
     entry = find_entry(contender.name)
     parts = setting.parts(contender.observation, entry.history, contender.proximity)
     driver = entry.driver(contender.observation, parts.n_cars, contender.proximity)

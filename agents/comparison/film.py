@@ -1,4 +1,4 @@
-"""The median episode of every row, driven once more and filmed."""
+"""Animation of the median episode of every row, which is repeated for it."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def median_films(
     address: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Frames for the animation, by row; the same drives as those that were measured.
+    """Return the animation frames by row, identical to the measured episodes.
 
     Args:
-        result: Whose rows.
-        jobs: Processes at a time.
+        result: Result of the comparison.
+        jobs: Parallel processes.
         engine: One of `agents.jobs.ENGINES`.
-        address: Of a cluster that runs, see `agents.jobs.find_engine`.
-        progress: Called with the share done, 0 to 1.
+        address: Address of a running cluster, see `agents.jobs.find_engine`.
+        progress: Called with the completed share, 0 to 1.
     """
     tasks = [(r.contender, r.setting, r.median_episode.seed) for r in result.rows]
     films: dict[int, dict[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""Drivers compared on real cars: what `relpos compare --swarm` does, as a function."""
+"""Comparison of drivers (controllers and policies) on real cars (`relpos compare --swarm`)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from hardware_bridge.live.env import HardwareFormationEnv
 from hardware_bridge.live.opened import OpenBridge
 
 EPISODES = 10
-"""[-] Of each driver, where the number is not given."""
+"""[-] Default number of episodes per driver."""
 STOPPED = " stopped: "
 
 
@@ -44,30 +44,30 @@ def compare_hardware(
     attend: Callable[[Callable[[str], None]], None] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> CompareResult:
-    """Let drivers drive real cars in turns, in real time, and compare what the cars believe.
+    """Evaluate drivers on real cars in alternation, in real time, by the tracker's estimates.
 
-    In a round every driver has one episode; each round begins with another of them, so that a
-    battery that drains or a floor that gets dusty treats all alike. Interrupted, it gives the
-    rounds that are complete.
+    Each round has one episode per driver and begins with a different driver, so that effects such
+    as battery discharge or dust on the floor are the same for all. The complete rounds are returned
+    if the comparison is interrupted.
 
     Args:
-        swarm: A swarm.toml, or what `read_config` made of one; the task is its own.
+        swarm: A swarm.toml or the configuration read by `read_config`; it determines the task.
         drivers: As for `agents.comparison.compare.compare`.
-        observations: As for `agents.comparison.compare.compare`, without the truth.
-        arm: Whether the cars may move, without which there is nothing to compare.
-        episodes: Of each driver and mode.
-        seconds: Length of an episode [s], less where the task is done before.
-        settle: Errors are scored from here on [s].
-        wait: So long is waited for all to be well before each episode [s].
-        open_bridge: Opens the cars, by default their ports.
-        attend: Called every hundredth of a second with what takes orders: ``arm``, ``disarm``,
-            ``stop``, ``clear``, or ``quit``, which ends it.
-        progress: Called with the share done, 0 to 1.
+        observations: As for `agents.comparison.compare.compare`, without ground truth.
+        arm: Permission for the cars to move; required.
+        episodes: Episodes per driver and mode.
+        seconds: Length of an episode, shorter if the task is accomplished [s].
+        settle: Time from which errors are scored [s].
+        wait: Longest time to wait for all cars to be healthy before each episode [s].
+        open_bridge: Opens the bridge to the cars, by default over their ports.
+        attend: Called every 10 ms with a function that accepts commands: ``arm``, ``disarm``,
+            ``stop``, ``clear``, or ``quit``, which ends the comparison.
+        progress: Called with the completed share, 0 to 1.
 
     Raises:
-        UsageError: A name that is not known, a number out of range, nothing left to compare;
-            the option is named.
-        BridgeError: Something of the swarm cannot be used, or the cars could not be armed.
+        UsageError: A name is unknown, a number out of range, or no combination can be compared;
+            the message contains the option.
+        BridgeError: A part of the swarm cannot be used, or the cars could not be armed.
     """
     check_numbers(episodes, 0, seconds, settle)
     if not arm:
@@ -121,7 +121,7 @@ def compare_hardware(
 
 @dataclass(slots=True)
 class _Seat:
-    """A contender that can drive, and what it has driven."""
+    """A compatible candidate and its episodes."""
 
     contender: Contender
     trained_on: str | None
@@ -130,18 +130,18 @@ class _Seat:
     rounds: list[EpisodeResult] = field(default_factory=list)
 
     def env(self, bridge: OpenBridge, cycles: int = 1) -> HardwareFormationEnv:
-        """The cars as it sees them; the last one that is made of a bridge is the one to use."""
+        """Return an environment with the candidate's observations; it invalidates earlier ones."""
         return bridge.env(
             observation=self.contender.observation, history=self.history, max_cycles=cycles
         )
 
     def warm_up(self, bridge: OpenBridge) -> None:
-        """Load what is loaded when first used, while no car waits for a decision."""
+        """Call the driver once for lazy initialisation, before any deadline applies."""
         for space in self.env(bridge).observation_spaces.values():
             self.driver.act(np.zeros(space.shape, np.float32))
 
     def row(self, config: SwarmConfig, setting: Setting, rounds: int) -> Row:
-        """Its complete rounds."""
+        """Return the row of the complete rounds."""
         return Row(
             contender=self.contender,
             trained_on=self.trained_on,
@@ -153,7 +153,7 @@ class _Seat:
 
 
 class _Orders:
-    """What people ask for while it lasts."""
+    """Commands of people during a comparison."""
 
     def __init__(self) -> None:
         self._quit = False
@@ -161,7 +161,7 @@ class _Orders:
     def attend_to(
         self, bridge: OpenBridge, attend: Callable[[Callable[[str], None]], None] | None
     ) -> None:
-        """Let orders reach a bridge."""
+        """Forward commands to a bridge."""
 
         def take(what: str) -> None:
             self._quit |= what == "quit"
@@ -173,7 +173,7 @@ class _Orders:
         bridge.start.attend = lambda: self._quit
 
     def check(self) -> None:
-        """After every decision: end it all if that was asked for."""
+        """Raise KeyboardInterrupt if ``quit`` was received; called after every control step."""
         if self._quit:
             raise KeyboardInterrupt
 
@@ -181,7 +181,7 @@ class _Orders:
 def _drive_round(
     bridge: OpenBridge, setting: Setting, seats: Sequence[_Seat], k: int, orders: _Orders
 ) -> None:
-    """One episode of every contender."""
+    """Run one episode of every candidate."""
     first = k % len(seats)
     for seat in (*seats[first:], *seats[:first]):
         driven = Driven(seat.env(bridge, setting.cycles), setting.cycles)
@@ -194,7 +194,7 @@ def _drive_round(
 def _seat(
     drivers: Sequence[str], observations: Sequence[str], config: SwarmConfig
 ) -> tuple[list[_Seat], list[str]]:
-    """All who can drive these cars, and why the others cannot."""
+    """Return the candidates that are compatible with the cars, and notes on the others."""
     seats, notes = [], []
     n_beams = config.task.proximity
     for contender in line_up(drivers, observations, n_beams):

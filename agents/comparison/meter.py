@@ -1,4 +1,4 @@
-"""What is measured in an episode, of a simulation or of real cars."""
+"""Metrics of an episode, simulated or with real cars."""
 
 from __future__ import annotations
 
@@ -15,46 +15,46 @@ from tracking.geometry import GRAVITY
 from tracking.params.short_repr import short_repr
 
 IN_FORMATION = 0.3
-"""[m] A group is in formation while the error of every car is below this. Tighter than the 0.4 m
-within which tasks call a single place taken (`relpos_env.tasks.moving.TOLERANCE`), and twice what
-estimates and tyres leave as a mean, so that it says how often something goes wrong."""
+"""[m] A group is in formation while the error of every car is below this. Below the 0.4 m within
+which tasks regard a slot as occupied (`relpos_env.tasks.moving.TOLERANCE`), and twice the mean
+error on estimates, so that the share of time in formation measures how often a group fails."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeResult:
-    """One episode; lengths and times as of `Setting`, NaN where there was nothing to score."""
+    """Metrics of one episode; scored time as in `Setting`, NaN for metrics without data."""
 
     __repr__ = short_repr
 
     seed: int
-    """On real cars the number of the round."""
+    """Seed of the episode; number of the round on real cars."""
     seconds: float
-    """[s] Length."""
+    """[s] Length of the episode."""
     done: bool
-    """Whether it ended because the task was accomplished."""
+    """True if the episode ended because the task was accomplished."""
     formation_error: float
-    """[m] As the task says, mean over present cars and the scored time."""
+    """[m] Formation error of the task, mean over present cars and the scored time."""
     place_error: float
-    """[m] Distance of the group's middle from where the task wants it, mean over the scored time;
-    NaN where the task gives no places."""
+    """[m] Distance of the group's centre from that of its goals, mean over the scored time; NaN if
+    the task has no goals."""
     tracking_error: float
-    """[m] Error of the relative positions that cars could use, mean over cars and scored time."""
+    """[m] Error of the usable relative positions, mean over cars and the scored time."""
     collisions_per_min: float
-    """[1/min] Contacts begun, summed over the cars, over the whole episode."""
+    """[1/min] Collisions (onsets of contact), summed over the cars, whole episode."""
     contact_time: float
-    """[-] Share of the cars' time in which they touch something, over the whole episode: collisions
-    begun do not tell who presses on."""
+    """[-] Share of the cars' time in contact, whole episode; unlike the number of collisions it
+    also measures lasting contact."""
     time_in_formation: float
     """[-] Share of the scored time in which every present car's error is below `IN_FORMATION`."""
     energy: float
-    """[J/min] Work of a car's motor at the wheels: what speeds the nominal mass up and what
-    rolling takes, without what braking would give back; mean over present cars, whole episode."""
+    """[J/min] Work of a car's motor at the wheels: acceleration of the nominal mass and rolling
+    resistance, without recuperation; mean over present cars, whole episode."""
     error: F64
-    """[m] Formation error after every decision, mean over present cars, (cycle)."""
+    """[m] Formation error after every control step, mean over present cars, (step,)."""
 
 
 class Running(Protocol):
-    """Episodes side by side, in arrays over (env, car); what is not known is NaN."""
+    """A batch of episodes in arrays over (env, car); unknown values are NaN."""
 
     @property
     def car(self) -> CarParams:
@@ -62,19 +62,19 @@ class Running(Protocol):
 
     @property
     def cycles(self) -> int:
-        """Decisions of the longest episode."""
+        """Control steps of the longest episode."""
 
     @property
     def observations(self) -> F32:
-        """What the cars see, (env, car, size)."""
+        """Observations of the cars, (env, car, size)."""
 
     @property
     def present(self) -> Bool:
-        """Who is in the room, (env, car)."""
+        """True for present cars, (env, car)."""
 
     @property
     def speed(self) -> F64:
-        """How fast the cars are, (env, car) [m/s]; another array after every decision."""
+        """Speed of the cars, (env, car) [m/s]; a new array after every control step."""
 
     @property
     def error(self) -> F64:
@@ -82,37 +82,37 @@ class Running(Protocol):
 
     @property
     def place_error(self) -> F64:
-        """Distance of the group's middle from that of its goals, (env) [m]."""
+        """Distance of the group's centre from that of its goals, (env,) [m]."""
 
     @property
     def tracking_error(self) -> F64:
-        """Of the relative positions that cars could use, (env, car) [m]."""
+        """Error of the usable relative positions, (env, car) [m]."""
 
     @property
     def collisions(self) -> F64:
-        """That cars began in the last decision, (env, car) [-]."""
+        """Collisions that began in the last control step, (env, car) [-]."""
 
     @property
     def clearance(self) -> F64:
-        """Way between a car and what is nearest to it, 0 at a touch, (env, car) [m]."""
+        """Distance from a car to the nearest object, 0 in contact, (env, car) [m]."""
 
     @property
     def done(self) -> Bool:
-        """Whether the task is accomplished, (env)."""
+        """True if the task is accomplished, (env,)."""
 
     @property
     def over(self) -> Bool:
-        """Whether the episode has ended, (env)."""
+        """True if the episode has ended, (env,)."""
 
     def step(self, actions: F32) -> None:
-        """One decision of all cars, (env, car, 2)."""
+        """Run one control step of all cars, actions (env, car, 2)."""
 
 
 class Meter:
-    """Reads episodes after every decision; those that are over are left alone."""
+    """Accumulates metrics after every control step, up to the end of each episode."""
 
     def __init__(self, running: Running) -> None:
-        """Begin to read.
+        """Initialise the metrics.
 
         Args:
             running: Episodes that have just begun.
@@ -123,7 +123,7 @@ class Meter:
         self._speed, self._present = running.speed, running.present.copy()
         e = len(self._present)
         self.going: Bool = np.ones(e, dtype=bool)
-        """Which still go on, (env)."""
+        """True for episodes that have not ended, (env,)."""
         self._cycles = np.zeros(e, dtype=np.int64)
         self._done = np.zeros(e, dtype=bool)
         self._error, self._place, self._tracking, self._worst = np.full(
@@ -133,12 +133,12 @@ class Meter:
         self._work, self._car_time = np.zeros((2, e))
 
     def read(self) -> None:
-        """Take down what the last decision led to."""
+        """Record the state after the last control step."""
         r = self._running
         present, speed, error, collisions = r.present, r.speed, r.error, r.collisions
         touching = np.where(np.isnan(r.clearance), np.nan, r.clearance == 0.0)
         work = _work(self._speed, speed, *self._car)
-        # A car that came in or was taken out in between was not driven there.
+        # Cars that joined or left during the step are not counted.
         driven = present & self._present
         tracking, place = r.tracking_error, r.place_error
         for e in np.flatnonzero(self.going).tolist():
@@ -161,15 +161,15 @@ class Meter:
         self._speed, self._present = speed, present.copy()
 
     def result(self, env: int, seed: int, first_scored: int) -> EpisodeResult:
-        """The figures of one episode.
+        """Return the metrics of one episode.
 
         Args:
-            env: Which.
-            seed: Its own.
-            first_scored: Number of the first decision whose errors count.
+            env: Index of the environment.
+            seed: Seed of the episode.
+            first_scored: Index of the first control step whose errors are scored.
         """
         n = int(self._cycles[env])
-        # What ends before it is scored is scored by its end, as in the demonstration.
+        # Episodes that end earlier are scored by their last step, as in the demonstration.
         scored = slice(min(first_scored, n - 1), n)
         worst = self._worst[env, scored]
         seconds = n * DECISION
@@ -189,19 +189,19 @@ class Meter:
 
 
 def _work(before: F64, after: F64, mass: float, rolling: float) -> F64:
-    """Work of the motor in a decision, none where the car is braked, (env, car) [J].
+    """Return the work of the motor in a control step, 0 while braking, (env, car) [J].
 
     Args:
-        before: Speed, (env, car) [m/s].
-        after: A decision later.
-        mass: [kg]
-        rolling: Resistance [N].
+        before: Speed before the step, (env, car) [m/s].
+        after: Speed after the step, (env, car) [m/s].
+        mass: Mass of a car [kg].
+        rolling: Rolling resistance [N].
     """
     kinetic = 0.5 * mass * (after**2 - before**2)
     return np.maximum(kinetic + rolling * 0.5 * (before + after) * DECISION, 0.0)
 
 
 def _mean(values: Any) -> float:
-    """Mean of what there is, NaN for nothing."""
+    """Return the mean of the finite values, NaN if there are none."""
     found = values[np.isfinite(values)]
     return float(found.mean()) if len(found) else float("nan")

@@ -1,4 +1,4 @@
-"""What a comparison found: figures of every driver, observation and scenario, and ratios."""
+"""Result of a comparison: metrics by driver, observation mode and scenario, and ratios."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ FIGURES = (
     "formation_error", "place_error", "tracking_error", "collisions_per_min", "contact_time",
     "time_in_formation", "energy",
 )  # fmt: skip
-"""What is measured in every episode, see `agents.comparison.meter.EpisodeResult`."""
+"""Metrics of every episode, see `agents.comparison.meter.EpisodeResult`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One driver on one mode of observations in one scenario, over all seeds."""
+    """One driver on one observation mode in one scenario, over all seeds."""
 
     __repr__ = short_repr
 
@@ -37,10 +37,10 @@ class Row:
     cars: int
     """[-] Slots for cars."""
     episodes: tuple[EpisodeResult, ...]
-    """By seed."""
+    """Metrics of the episodes, by seed."""
 
     def values(self, figure: str) -> F64:
-        """A figure of every episode, (episode); NaN where it has none.
+        """Return a metric of every episode, (episode,); NaN where undefined.
 
         Args:
             figure: A field of `EpisodeResult`.
@@ -49,59 +49,59 @@ class Row:
 
     @cached_property
     def means(self) -> dict[str, Interval | None]:
-        """Every figure over the episodes, None where none has it."""
+        """Mean of every metric over the episodes, None where undefined in all of them."""
         return {name: mean(self.values(name)) for name in FIGURES}
 
     @property
     def median_episode(self) -> EpisodeResult:
-        """That whose formation error is in the middle; the lower one of two."""
+        """Episode with the median formation error, the lower one of two."""
         ranked = sorted(
             self.episodes, key=lambda e: (np.isnan(e.formation_error), e.formation_error)
         )
         return ranked[(len(ranked) - 1) // 2]
 
     def ratio(self, reference: Row) -> Interval | None:
-        """Formation error over that of another on the same seeds; below 1 this one is better."""
+        """Return the formation error relative to `reference` on the same seeds; < 1 is better."""
         return ratio(self.values("formation_error"), reference.values("formation_error"))
 
 
 @dataclass(frozen=True, kw_only=True)
 class CompareResult:
-    """Drivers compared."""
+    """Result of a comparison."""
 
     __repr__ = short_repr
 
     rows: tuple[Row, ...]
-    """By scenario, then driver, then observation."""
+    """Rows by scenario, then driver, then observation mode."""
     notes: tuple[str, ...]
-    """What was left out, and why."""
+    """Incompatible combinations with reasons."""
     first_seed: int
-    """On real cars the number of the first round."""
+    """Seed of the first episode; number of the first round on real cars."""
     seeds: int
     errors_from: Literal["truth", "estimates"] = "truth"
-    """Whether errors are true, or what real cars believed."""
+    """Source of the errors: ground truth, or the estimates of real cars."""
     remarks: tuple[str, ...] = ()
-    """What happened to real cars on the way."""
+    """Incidents with real cars during the comparison."""
 
     @property
     def scenarios(self) -> tuple[str, ...]:
-        """Names, in order."""
+        """Names of the scenarios, in order."""
         return tuple(dict.fromkeys(r.scenario for r in self.rows))
 
     @property
     def contenders(self) -> tuple[Contender, ...]:
-        """All, in order."""
+        """All candidates, in order."""
         return tuple(dict.fromkeys(r.contender for r in self.rows))
 
     def of(self, scenario: str) -> list[Row]:
-        """The rows of a scenario."""
+        """Return the rows of a scenario."""
         return [r for r in self.rows if r.scenario == scenario]
 
     def reference(self, scenario: str) -> Row:
-        """Whom the others of a scenario are measured by.
+        """Return the reference of a scenario for ratios.
 
-        The controller with the least formation error among those that are not told the truth;
-        where there is none, among those that are; without any controller, the best policy.
+        The reference is the controller with the lowest formation error on other modes than
+        `truth`; without one, the best controller on `truth`; without controllers, the best policy.
         """
 
         def rank(row: Row) -> tuple[bool, bool, float]:
@@ -113,12 +113,12 @@ class CompareResult:
 
     @cached_property
     def records(self) -> list[dict[str, Any]]:
-        """One flat record a row, ready for JSON; what could not be measured is None."""
+        """One flat record per row for JSON; unmeasured values are None."""
         return [self._record(row) for row in self.rows]
 
     @property
     def episode_records(self) -> list[dict[str, Any]]:
-        """One flat record an episode, ready for JSON."""
+        """One flat record per episode for JSON."""
         return [
             {
                 "policy": row.contender.called,
@@ -172,5 +172,5 @@ def _ends(found: Interval | None) -> list[float] | None:
 
 
 def _number(value: float) -> float | None:
-    """A finite number, or None."""
+    """Return a finite number, or None."""
     return float(value) if np.isfinite(value) else None

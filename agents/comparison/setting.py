@@ -1,4 +1,4 @@
-"""What all contenders are put into: scenario, task, cars, time."""
+"""Evaluation setting of all candidates: scenario, task, cars, duration."""
 
 from __future__ import annotations
 
@@ -15,45 +15,45 @@ from relpos_env.timing import DECISION
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """One scenario and task; what the contenders see of it is their own."""
+    """One scenario and task; the observation mode depends on the candidate."""
 
     scenario: str | Path | None = None
     """One of `relpos_env.scenarios.SCENARIOS` or a TOML file; by default that of the task."""
     task: str = "ring"
     """One of `relpos_env.tasks.TASKS`."""
     task_options: Mapping[str, Any] = field(default_factory=dict)
-    """The task's own options, by name."""
+    """Options of the task, by name."""
     cars: int | None = None
-    """[-] Slots for cars; by default as many as the scenario can have."""
+    """[-] Slots for cars; by default the maximum of the scenario."""
     level: int | None = None
-    """Randomisation of a level of the curriculum, 0 to 4, in place of the scenario's own."""
+    """Curriculum level of the randomisation, 0 to 4, in place of the scenario's own."""
     operator: float = 1.0
-    """[-] Share of episodes with an operator; in the others cars follow the plan alone."""
+    """[-] Share of episodes with an operator; in the others cars only follow the plan."""
     seconds: float = 60.0
-    """[s] Length of an episode, less where the task is done before."""
+    """[s] Length of an episode, shorter if the task is accomplished."""
     settle: float = SETTLE
-    """[s] Errors are scored from here on."""
+    """[s] Time from which errors are scored."""
 
     @property
     def cycles(self) -> int:
-        """Decisions of an episode."""
+        """Control steps of an episode."""
         return round(self.seconds / DECISION)
 
     @property
     def first_scored(self) -> int:
-        """Number of the first decision whose errors count."""
+        """Index of the first control step whose errors are scored."""
         return round(self.settle / DECISION)
 
     def parts(self, observation: str, history: int, proximity: int = 0) -> Parts:
-        """What the environments are made of.
+        """Return the parts of the environments.
 
         Args:
             observation: One of `relpos_env.interface.observations.OBSERVATIONS`.
-            history: So many observations in one.
-            proximity: Beams that measure distances round each car.
+            history: Number of stacked observations.
+            proximity: Number of distance sensors around each car.
 
         Raises:
-            EnvError: An unknown name or a number out of range.
+            EnvError: A name is unknown or a number out of range.
         """
         return configure(
             {

@@ -1,9 +1,8 @@
-"""Means over episodes and how sure they are.
+"""Means over episodes with confidence intervals.
 
-Intervals hold 95 % and come from the bootstrap: episodes are drawn again with replacement, as
-many as there are, and the quantiles of the statistic over the draws are corrected for bias and
-skewness (BCa, [1]). Figures of two drivers on the same seeds are drawn in pairs, so that what
-makes an episode hard for both cancels.
+Intervals have 95 % confidence and come from the bias-corrected and accelerated bootstrap (BCa,
+[1]): episodes are resampled with replacement. Two drivers on the same seeds are resampled in
+pairs, which cancels the common difficulty of an episode.
 
 References:
     [1] Efron, Tibshirani, An Introduction to the Bootstrap, Chapman & Hall 1993, ch. 14.
@@ -21,31 +20,31 @@ from scipy import stats
 from tracking.arrays import F64
 
 LEVEL = 0.95
-"""[-] Probability that an interval holds the true value."""
+"""[-] Confidence level of the intervals."""
 DRAWS = 4999
-"""[-] Times the episodes are drawn again."""
+"""[-] Number of bootstrap resamples."""
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A figure with the interval that it lies in."""
+    """An estimate with its confidence interval."""
 
     value: float
     low: float | None
-    """None where there are too few episodes to tell."""
+    """Lower end; None if there are too few episodes."""
     high: float | None
 
     @property
     def ends(self) -> list[float] | None:
-        """Both ends, ready for JSON."""
+        """Both ends, for JSON."""
         return None if self.low is None or self.high is None else [self.low, self.high]
 
 
 def mean(values: F64) -> Interval | None:
-    """Mean over episodes; None where no episode has the figure.
+    """Return the mean over episodes; None if all values are NaN.
 
     Args:
-        values: (episode), NaN where it has none.
+        values: Metric by episode, (episode,); NaN where undefined.
     """
     found = values[np.isfinite(values)]
     if len(found) == 0:
@@ -54,14 +53,14 @@ def mean(values: F64) -> Interval | None:
 
 
 def ratio(values: F64, reference: F64) -> Interval | None:
-    """Ratio of the means of two drivers on the same seeds; below 1 the first has less.
+    """Return the ratio of the means of two drivers on the same seeds.
 
     Args:
-        values: (episode), NaN where an episode has none; it is left out of both.
-        reference: (episode), by the same seeds.
+        values: Metric by episode, (episode,); episodes with NaN in either argument are omitted.
+        reference: Metric of the reference driver on the same seeds, (episode,).
 
     Returns:
-        None where nothing is left, or the reference is 0.
+        None if no episode remains or the mean of the reference is 0.
     """
     both = np.isfinite(values) & np.isfinite(reference)
     if not both.any() or reference[both].mean() == 0.0:
@@ -70,11 +69,11 @@ def ratio(values: F64, reference: F64) -> Interval | None:
 
 
 def _interval(samples: tuple[F64, ...], statistic: Callable[..., F64]) -> Interval:
-    """The statistic of paired samples, with its interval."""
+    """Return a statistic of paired samples with its confidence interval."""
     value = float(statistic(*samples, axis=-1))
     if len(samples[0]) < 2:
         return Interval(value, None, None)
-    # Where all draws are the same BCa has no answer, and the quantiles are the figure itself.
+    # BCa is undefined if all resamples are equal; the percentile interval is then the value itself.
     for method in ("BCa", "percentile"):
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")

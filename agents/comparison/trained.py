@@ -1,4 +1,4 @@
-"""Trained policies as contenders."""
+"""Trained policies as candidates of a comparison."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from agents.policies import Layout, TrainedPolicy, load_policy, shipped_names
 
 @dataclass(frozen=True, slots=True)
 class TrainedEntry:
-    """A policy: it drives cars that see what it was made for, and fewer of them."""
+    """A policy, for its observation layout and at most its number of cars."""
 
     policy: TrainedPolicy
 
     @property
     def title(self) -> str:
-        """What its card calls it."""
+        """Name in the model card."""
         return self.policy.card.name
 
     @property
@@ -27,29 +27,29 @@ class TrainedEntry:
 
     @property
     def history(self) -> int:
-        """So many observations it sees in one."""
+        """Number of stacked observations."""
         return self.policy.layout.history
 
     @property
     def proximity(self) -> int:
-        """Beams that it was trained with."""
+        """Distance sensors that it was trained with."""
         return self.policy.layout.proximity
 
     def refusal(self, observation: str, n_cars: int, proximity: int) -> str | None:
-        """Why it cannot drive so many cars on a mode of observations; None if it can."""
+        """Return the reason for an incompatible mode or number of cars; None if compatible."""
         seen = Layout(observation, n_cars, self.history, proximity)
         return self.policy.layout.refusal(seen)
 
     def driver(self, observation: str, n_cars: int, proximity: int) -> Driver:
-        """The policy, fitted to so many cars."""
+        """Return the policy, adapted to the number of cars."""
         return self.policy.driver(Layout(observation, n_cars, self.history, proximity))
 
 
 def find_trained(name: str) -> TrainedEntry | None:
-    """The policy of a name, file or folder; None for what looks like none of them.
+    """Return the policy of a name, file or folder; None if `name` looks like none of them.
 
     Raises:
-        PolicyError: It is missing, damaged or foreign.
+        PolicyError: The policy is missing, damaged or foreign.
     """
     path = Path(name)
     if name in shipped_names() or path.suffix or len(path.parts) > 1 or path.exists():

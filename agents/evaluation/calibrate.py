@@ -1,4 +1,4 @@
-"""Calibrating the sensors of a recorded run: what `relpos calibrate` does, as functions."""
+"""Calibration of sensors from a recorded run (`relpos calibrate`)."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ from tracking.params.short_repr import short_repr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrateResult:
-    """One kind of sensor of one log."""
+    """Calibration of one kind of sensor from one log."""
 
     __repr__ = short_repr
 
     log: Log
     calibration: Calibration
     imu: Mapping[int, ImuResult] = field(default_factory=dict)
-    """By node id."""
+    """IMU results by node id."""
     mag: Mapping[int, MagResult] = field(default_factory=dict)
-    """By node id."""
+    """Magnetometer results by node id."""
     uwb: UwbResult | None = None
     ranges: RangeTable | None = None
-    """What the UWB calibration was made from."""
+    """Input of the UWB calibration."""
     refused: Mapping[int, str] = field(default_factory=dict)
-    """Why a node was not calibrated, by node id."""
+    """Reasons for nodes that were not calibrated, by node id."""
     sensor: str
     """`imu`, `mag` or `uwb`."""
 
     @property
     def summary(self) -> list[dict[str, Any]]:
-        """The figures, ready for JSON: one record a node, and for UWB one of the group first."""
+        """Records for JSON: one per node, for UWB preceded by one of the group."""
         head = {"log": self.log.name}
         records = [
             {**head, "sensor": "imu", "node": n, **_imu_record(r)} for n, r in self.imu.items()
@@ -73,12 +73,12 @@ class CalibrateResult:
 
 
 def calibrate_imus(log: Log, *, level: bool = False, gravity: float = GRAVITY) -> CalibrateResult:
-    """Gyroscope and accelerometer offsets of every node from its rest.
+    """Estimate gyroscope and accelerometer offsets of every node while it is at rest.
 
     Args:
-        log: A run in which the nodes lie still for a while.
-        level: The nodes lie level whenever they are at rest.
-        gravity: Length of gravity there [m/s2].
+        log: A run in which the nodes are at rest for some time.
+        level: True if the nodes are level whenever they are at rest.
+        gravity: Local gravity [m/s2].
 
     Raises:
         CalibrationError: No node can be calibrated.
@@ -97,11 +97,11 @@ def calibrate_imus(log: Log, *, level: bool = False, gravity: float = GRAVITY) -
 
 
 def calibrate_magnetometers(log: Log, *, seed: int = 0) -> CalibrateResult:
-    """Hard and soft iron of every node.
+    """Estimate the hard- and soft-iron errors of every node.
 
     Args:
-        log: A run in which the nodes are turned on the spot, in every direction.
-        seed: Of the robust fit.
+        log: A run in which the nodes are rotated on the spot in every direction.
+        seed: Seed of the robust fit.
 
     Raises:
         CalibrationError: No node can be calibrated.
@@ -119,15 +119,15 @@ def calibrate_magnetometers(log: Log, *, seed: int = 0) -> CalibrateResult:
 
 
 def calibrate_ranges(log: Log, *, seed: int = 0, max_distance: float = 8.0) -> CalibrateResult:
-    """Slope and antenna delays of all nodes at once, against truth.
+    """Estimate range slope and antenna delays of all nodes jointly against ground truth.
 
     Args:
-        log: A run with truth.
-        seed: Of RANSAC.
-        max_distance: Farther ranges are not used [m].
+        log: A run with ground truth.
+        seed: Seed of RANSAC.
+        max_distance: Longest range that is used [m].
 
     Raises:
-        CalibrationError: The log cannot support it.
+        CalibrationError: The data of the log are insufficient.
     """
     table = range_table(log.block, log.constellation, log.truth)
     params = UwbParams(max_distance=max_distance)
@@ -148,10 +148,10 @@ def calibrate_ranges(log: Log, *, seed: int = 0, max_distance: float = 8.0) -> C
 
 
 def apply_calibrations(log: Log, paths: Iterable[Path | str]) -> Log:
-    """A log with its measurements corrected by one or more calibration files.
+    """Return a log with measurements corrected by one or more calibration files.
 
     Raises:
-        ConfigError: A file is wrong, two give the same field, or they do not fit the log.
+        ConfigError: A file is invalid, two contain the same field, or they do not fit the log.
     """
     calibration = merge(read_calibration(path) for path in paths)
     return replace(log, block=calibration.apply(log.block, log.constellation))
@@ -165,7 +165,7 @@ def _events(log: Log, n: int, kind: Kind) -> np.ndarray:
 def _each_node(
     log: Log, kind: Kind, calibrate: Callable[[int], Any]
 ) -> tuple[dict[int, Any], dict[int, str]]:
-    """Results and refusals of every node that has such measurements, by id."""
+    """Return results and refusals by id, for nodes with measurements of a kind."""
     found: dict[int, Any] = {}
     refused: dict[int, str] = {}
     for n, node_id in enumerate(log.constellation.ids):

@@ -1,4 +1,4 @@
-"""Every case, seed and filter of a suite: what `relpos evaluate` does, as a function."""
+"""Evaluation of a suite over cases, seeds and filters (`relpos evaluate`)."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from tracking.filters import FILTERS, filter_builder
 from tracking.params.short_repr import short_repr
 
 MEDIANS = ("rmse", "rmse_yaw", "rmse_shape", "bound", "bound_yaw", "bound_shape")
-"""Lengths that are medians over the seeds [m]."""
+"""[m] Metrics that are summarised by their medians over the seeds."""
 SHORTEST, LONGEST = 15.0, 1800.0
-"""[s] The first ten seconds are not scored; a person is simulated for half an hour at most."""
+"""[s] The first ten seconds are not scored; the simulation of a person is limited to 1800 s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,22 +33,22 @@ class CaseResult:
     case: Case
     filter: str
     runs: tuple[RunResult, ...]
-    """By seed."""
+    """Runs by seed."""
 
     @property
     def paper(self) -> float | None:
-        """Error that the paper reports [m]."""
+        """Error reported by the paper [m]."""
         return self.case.paper.get(self.filter)
 
     @property
     def targets(self) -> list[Outcome]:
-        """What is asked of this filter here, and what is reached."""
+        """Targets of this filter in this case, with the results."""
         figures = {name: self.median(name) for name in MEDIANS}
         return outcomes(self.case.asked.get(self.filter, {}), figures)
 
     @property
     def record(self) -> dict[str, Any]:
-        """The figures, ready for JSON; what could not be scored is None."""
+        """Metrics for JSON; None where they could not be scored."""
         ratios = ("ratio_bound", "ratio_shape")
         return {
             "suite": self.suite,
@@ -72,19 +72,19 @@ class CaseResult:
         }
 
     def values(self, name: str) -> list[float]:
-        """A figure of every run that has it.
+        """Return a metric of every run in which it is defined.
 
         Args:
-            name: One of `RunResult`.
+            name: Field of `RunResult`.
         """
         found = (getattr(r, name) for r in self.runs)
         return [v for v in found if v is not None]
 
     def median(self, name: str) -> float | None:
-        """Median of a figure over the runs that have it.
+        """Return the median of a metric over the runs in which it is defined.
 
         Args:
-            name: One of `RunResult`.
+            name: Field of `RunResult`.
         """
         values = self.values(name)
         return float(np.median(values)) if values else None
@@ -92,7 +92,7 @@ class CaseResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluateResult:
-    """A suite evaluated."""
+    """Result of a suite."""
 
     __repr__ = short_repr
 
@@ -100,23 +100,23 @@ class EvaluateResult:
     filters: tuple[str, ...]
     seeds: int
     seconds: float
-    """[s] Length of every run."""
+    """[s] Length of each run."""
     cases: tuple[CaseResult, ...]
-    """By case, then filter."""
+    """Results by case, then filter."""
 
     @property
     def by_case(self) -> list[tuple[Case, list[CaseResult]]]:
-        """Cases with the result of every filter."""
+        """Cases with the results of all filters."""
         return [(case, [c for c in self.cases if c.case is case]) for case in self.suite.cases]
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """One flat record for each case and filter."""
+        """One flat record per case and filter."""
         return [c.record for c in self.cases]
 
     @property
     def run_records(self) -> list[dict[str, Any]]:
-        """One flat record for each run."""
+        """One flat record per run."""
         return [{"suite": c.suite, **r.record} for c in self.cases for r in c.runs]
 
 
@@ -133,22 +133,22 @@ def evaluate(
 ) -> EvaluateResult:
     """Track simulated runs of every case and seed with every filter, and score them.
 
-    With more than one job the calling script must be importable: its work belongs below
-    `if __name__ == "__main__"`, and the functions that change logs into modules.
+    With more than one job the calling script must be importable: put its code below
+    `if __name__ == "__main__"`, and functions that change logs into modules.
 
     Args:
-        suite: One of `agents.evaluation.suites.SUITES`, or one of your own.
+        suite: One of `agents.evaluation.suites.SUITES`, or a custom suite.
         filters: Names in `tracking.filters.FILTERS`.
-        seeds: So many runs of each case, seeds 0, 1, ...; by default those of the suite.
+        seeds: Number of runs per case, with seeds 0, 1, ...; by default that of the suite.
         seconds: Length of a run [s]; by default that of the suite.
-        jobs: Processes at a time. Nothing but the time of a round depends on it.
+        jobs: Parallel processes. Only the measured time per round depends on it.
         engine: One of `agents.jobs.ENGINES`.
-        address: Of a cluster that runs, see `agents.jobs.find_engine`.
-        progress: Called with the share done, 0 to 1.
+        address: Address of a running cluster, see `agents.jobs.find_engine`.
+        progress: Called with the completed share, 0 to 1.
 
     Raises:
-        UsageError: A name that is not known or a number out of range, or too many jobs for the
-            machine; the option is named.
+        UsageError: A name is unknown, a number out of range, or there are too many jobs for the
+            machine; the message contains the option.
     """
     chosen = suite if isinstance(suite, Suite) else find_suite(suite)
     names = check_filters(filters)
@@ -181,13 +181,13 @@ def evaluate(
 
 
 def find_suite(name: str) -> Suite:
-    """Look a suite up.
+    """Return a suite by its name.
 
     Args:
         name: One of `SUITES`.
 
     Raises:
-        UsageError: No suite of that name.
+        UsageError: There is no suite of that name.
     """
     if name not in SUITES:
         raise UsageError(f"--suite: expected one of {', '.join(SUITES)}, got {name!r}")
@@ -195,13 +195,13 @@ def find_suite(name: str) -> Suite:
 
 
 def check_filters(names: Iterable[str]) -> tuple[str, ...]:
-    """Filters as they were named, each once.
+    """Return the filter names in order, without duplicates.
 
     Args:
         names: Names in `tracking.filters.FILTERS`.
 
     Raises:
-        UsageError: No such filter, or none at all.
+        UsageError: A filter does not exist, or there are no names.
     """
     chosen = tuple(dict.fromkeys(names))
     if not chosen:

@@ -1,4 +1,4 @@
-"""When a run is lost: a pair is wrong for longer than a wrong measurement explains."""
+"""Detection of lost runs: a pair is wrong for longer than wrong measurements explain."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from tracking.arrays import F64, Bool
 from tracking.estimate import Status, TeamEstimate
 
 WRONG = 1.0
-"""[m] A position error above this is wrong."""
+"""[m] Position error above which a pair is wrong."""
 FOR = 1.0
-"""[s] So long in one go makes a run lost."""
+"""[s] Uninterrupted time of a wrong pair after which the run is lost."""
 GRACE = 10.0
-"""[s] After the first range a filter must have found its pairs, whatever its status says."""
+"""[s] Time after the first range from which wrong pairs count, whatever their status."""
 
 
 def converged_at(estimate: TeamEstimate, first: float) -> float:
-    """When all pairs were ok at once for the first time, at most `GRACE` after the first range [s].
+    """Return the first time when all pairs are ok, at most `GRACE` after the first range [s].
 
     Args:
-        estimate: Of one run, arrays over (time, pair).
+        estimate: Estimates of one run, arrays over (time, pair).
         first: Time of the first range [s].
     """
     ok = estimate.t[estimate.ok.all(axis=1)]
@@ -27,15 +27,15 @@ def converged_at(estimate: TeamEstimate, first: float) -> float:
 
 
 def lost_at(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, first: float) -> float | None:
-    """When a run was lost, None if never [s].
+    """Return the time when a run is lost, None if never [s].
 
-    From `converged_at` on, a pair is wrong where its position is off by more than `WRONG`, or
-    where it has none. The run is lost when the same pair was wrong for longer than `FOR`.
+    From `converged_at` on, a pair is wrong if its position error exceeds `WRONG` or it has no
+    estimate. The run is lost when the same pair has been wrong for longer than `FOR`.
 
     Args:
-        estimate: Of one run, arrays over (time, pair).
+        estimate: Estimates of one run, arrays over (time, pair).
         truth_ij_w: True relative positions, (time, pair, 3) [m].
-        has_truth: Where they are known, (time, pair).
+        has_truth: True where `truth_ij_w` is known, (time, pair).
         first: Time of the first range [s].
     """
     t = estimate.t

@@ -1,4 +1,4 @@
-"""Error and consistency of a run over time, in bins, so that runs can be laid over each other."""
+"""Error and consistency of a run over time, in bins common to all runs."""
 
 from __future__ import annotations
 
@@ -13,37 +13,37 @@ from tracking.metrics.score import errors_after
 from tracking.params.short_repr import short_repr
 
 BIN = 0.5
-"""[s]"""
+"""[s] Width of a bin."""
 NIS_EDGES = np.linspace(0.0, 10.0, 41)
-"""[-] Bins of the NIS; larger ones are counted in one more."""
+"""[-] Bin edges of the NIS; one additional bin counts larger values."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OverTime:
-    """What a run looks like over time; NaN where nothing could be said."""
+    """Metrics of a run over time; NaN for bins without data."""
 
     __repr__ = short_repr
 
     t: F64
-    """Middle of each bin, (bin) [s]."""
+    """[s] Centres of the bins, (bin,)."""
     error: F64
-    """Position error after one constant yaw, mean over pairs, (bin) [m]."""
+    """[m] Position error after one constant yaw, mean over pairs, (bin,)."""
     nees: F64
-    """Squared position error over its covariance and per dimension, mean over pairs, (bin) [-]."""
+    """[-] NEES of the positions per dimension, mean over pairs, (bin,)."""
     nis_counts: I64
-    """How many ranges had a NIS in each bin of `NIS_EDGES`, and beyond, (bin + 1)."""
+    """Number of ranges with a NIS in each bin of `NIS_EDGES`, and above, (len(NIS_EDGES),)."""
 
 
 def over_time(
     estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, yaw_rad: float, seconds: float
 ) -> OverTime:
-    """Take the means of a run.
+    """Average errors, NEES and NIS of a run in bins.
 
     Args:
-        estimate: Of one run, arrays over (time, pair).
+        estimate: Estimates of one run, arrays over (time, pair).
         truth_ij_w: True relative positions, (time, pair, 3) [m].
-        has_truth: Where they are known, (time, pair).
-        yaw_rad: The constant yaw that is taken out of the errors [rad].
+        has_truth: True where `truth_ij_w` is known, (time, pair).
+        yaw_rad: Constant yaw that is removed from the errors [rad].
         seconds: Length of the run [s].
     """
     n_bins = max(round(seconds / BIN), 1)
@@ -63,7 +63,7 @@ def over_time(
 
 
 def _bin_means(bins: I64, values: F64, used: Bool, n_bins: int) -> F64:
-    """Means over time and pairs in every bin, NaN where there is nothing, (bin)."""
+    """Return means over time and pairs in every bin, NaN if empty, (bin,)."""
     at = np.broadcast_to(bins[:, None], values.shape)[used]
     total = np.bincount(at, weights=values[used], minlength=n_bins)
     count = np.bincount(at, minlength=n_bins)
@@ -71,7 +71,7 @@ def _bin_means(bins: I64, values: F64, used: Bool, n_bins: int) -> F64:
 
 
 def _count_nis(estimate: TeamEstimate) -> I64:
-    """Each NIS counts once, when it is first seen."""
+    """Return the histogram of the NIS; repeated values count once."""
     nis = estimate.nis
     fresh = np.zeros(nis.shape, dtype=bool)
     fresh[1:] = (nis[1:] != nis[:-1]) & (nis[1:] > 0.0)

@@ -1,4 +1,4 @@
-"""One run: a simulated log, tracked by one filter and scored."""
+"""One run: a simulated log is tracked by one filter and scored."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from tracking.params.short_repr import short_repr
 from tracking.tracker import Tracker
 
 SKIP = 10.0
-"""[s] After the first range, not scored."""
+"""[s] Time after the first range that is not scored."""
 WARM_UP = 200
-"""[-] So many events are tracked before the clock runs, so that compiling is not timed."""
+"""[-] Events that are tracked before the time measurement, which excludes compilation."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunResult:
-    """One case, seed and filter; figures are None where there was nothing to score."""
+    """Metrics of one case, seed and filter; None where there was nothing to score."""
 
     __repr__ = short_repr
 
@@ -39,23 +39,23 @@ class RunResult:
     seed: int
     nodes: int
     rmse: float | None
-    """[m]"""
+    """[m] Position error without alignment."""
     rmse_yaw: float | None
-    """[m]"""
+    """[m] Position error after one constant yaw."""
     rmse_shape: float | None
-    """[m]"""
+    """[m] Position error after the best rotation at each instant."""
     bound: float | None
-    """[m] `rmse` that is expected of an efficient estimator (`tracking.metrics.bound`)."""
+    """[m] Expected `rmse` of an efficient estimator (posterior CRLB, `tracking.metrics.bound`)."""
     bound_yaw: float | None
-    """[m] The same of `rmse_yaw`."""
+    """[m] Expected `rmse_yaw` of an efficient estimator."""
     bound_shape: float | None
-    """[m] The same of `rmse_shape`."""
+    """[m] Expected `rmse_shape` of an efficient estimator."""
     nees: float | None
-    """[-]"""
+    """[-] Mean NEES of positions after one constant yaw, per dimension."""
     nis: float | None
-    """[-]"""
+    """[-] Mean NIS of accepted ranges."""
     gospa: float | None
-    """[m] Labelled GOSPA after one constant yaw: errors, and pairs that are missed or not there."""
+    """[m] Labelled GOSPA after one constant yaw: errors, missed and false pairs."""
     coverage: float | None
     """[-] Share of the scored time with an estimate."""
     ok_share: float | None
@@ -63,23 +63,23 @@ class RunResult:
     integrity_share: float | None
     """[-] Share of the run in which pairs were ok and wrong, see `tracking.metrics.integrity`."""
     integrity_worst_s: float | None
-    """[s] Longest time in one go that a pair was so."""
+    """[s] Longest uninterrupted time in which a pair was ok and wrong."""
     converged_s: float
-    """[s] From the first range until all pairs were ok, at most 10."""
+    """[s] Time from the first range until all pairs were ok, at most 10."""
     lost_s: float | None
-    """[s] When the run was lost, None if never."""
+    """[s] Time when the run was lost, None if never."""
     rejected: int
-    """Ranges refused as outliers."""
+    """Ranges rejected as outliers."""
     rounds_hz: float
-    """[1/s] Ranges over pairs and time."""
+    """[1/s] Ranges per pair and second."""
     us_per_round: float
-    """[us] Time of the tracker, orientation and reports too, over rounds; the only figure that is
-    not repeatable."""
+    """[us] Run time of the tracker per ranging round, orientation and reports included; the only
+    metric that is not repeatable."""
     over_time: OverTime
 
     @property
     def lost(self) -> bool:
-        """Whether a pair was wrong for too long."""
+        """True if the run was lost."""
         return self.lost_s is not None
 
     @property
@@ -94,7 +94,7 @@ class RunResult:
 
     @property
     def record(self) -> dict[str, Any]:
-        """The figures, ready for JSON."""
+        """Metrics for JSON."""
         names = [n for n in self.__slots__ if n != "over_time"]
         return {n: getattr(self, n) for n in names} | {
             "ratio_bound": self.ratio_bound,
@@ -106,12 +106,12 @@ def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> Ru
     """Track the log of a case and score it.
 
     Args:
-        case: What kind of run it is.
-        log: Its log, with truth.
+        case: Case of the run.
+        log: Log of the run, with ground truth.
         filter: One of `tracking.filters.FILTERS`.
-        seed: That of the log.
-        bound: Expected errors of an efficient estimator; None where cars come and go, which it
-            does not know.
+        seed: Seed of the log.
+        bound: Expected errors of an efficient estimator; None if cars join or leave, which the
+            bound does not model.
     """
     constellation, block = log.constellation, log.block
     first, last = log.t_range
@@ -161,13 +161,13 @@ def run(case: Case, log: Log, filter: str, seed: int, bound: Bound | None) -> Ru
 
 
 def run_seed(case: Case, seed: int, filters: tuple[str, ...], seconds: float) -> list[RunResult]:
-    """All filters on the run of one seed.
+    """Run all filters on the log of one seed.
 
     Args:
-        case: What kind of run it is.
-        seed: Same seed, same figures but for the time.
+        case: Case of the run.
+        seed: Seed of the log; it determines all metrics except the run time.
         filters: Names in `tracking.filters.FILTERS`.
-        seconds: Length of the run.
+        seconds: Length of the run [s].
     """
     log = case.log(seed, seconds)
     stays = log.truth.pairs(log.constellation, log.truth.times())[1].all()
@@ -176,7 +176,7 @@ def run_seed(case: Case, seed: int, filters: tuple[str, ...], seconds: float) ->
 
 
 def _number(value: float | None) -> float | None:
-    """A finite number, or None."""
+    """Return a finite number, or None."""
     return None if value is None or not np.isfinite(value) else float(value)
 
 

@@ -1,4 +1,4 @@
-"""What is evaluated: suites of cases. Adding a case: a line here."""
+"""Suites of evaluation cases; a new case is one entry here."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ Change = Callable[[Log, np.random.Generator], Log]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One kind of run."""
+    """One evaluation case."""
 
     name: str
     about: str
-    """What is special, in a line."""
+    """Description in one line."""
     scenario: Scenario | HumanScenario
     change: Change | None = None
-    """What is done to the log; None for nothing. A function of a module, so that other
-    processes find it."""
+    """Degradation of the log; None for none. A function at module level, so that it can be
+    pickled for other processes."""
     paper: Mapping[str, float] = field(default_factory=dict)
-    """Error that the paper reports, by filter [m]."""
+    """[m] Error reported by the paper, by filter."""
     asked: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    """The most that figures may be, by filter, see `agents.evaluation.targets` [m]."""
+    """[m] Upper limits of metrics, by filter, see `agents.evaluation.targets`."""
 
     def log(self, seed: int, seconds: float) -> Log:
-        """The run of one seed.
+        """Simulate the log of one seed.
 
         Args:
-            seed: Same seed, same log, bit for bit.
-            seconds: Its length.
+            seed: Seed of the log, which it determines bit for bit.
+            seconds: Length of the run [s].
         """
         log = record(self.scenario, seconds=seconds, seed=seed)
         if self.change is None:
@@ -57,21 +57,21 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Suite:
-    """Cases that are looked at together."""
+    """Cases that are evaluated together."""
 
     name: str
     title: str
     cases: tuple[Case, ...]
     seeds: int
-    """So many by default, from 0."""
+    """Default number of seeds, from 0."""
     seconds: float
-    """[s] Length of a run by default."""
+    """[s] Default length of a run."""
 
 
 MOUNTS = Randomisation(
     mount_ahead=(-0.15, 0.2), mount_aside=(-0.05, 0.05), friction=(0.8, 1.1), mass=(0.85, 1.2)
 )
-"""Trackers from the rear axle to the front bumper, and cars as at level 2."""
+"""Mounts of trackers between rear axle and front bumper, and randomised cars of level 2."""
 PAPER = (
     Case(
         name="cars-los",
@@ -103,7 +103,7 @@ PAPER = (
         asked={"ekf-mds": {"rmse_shape": 0.217}, "joint": {"rmse_yaw": 0.108, "rmse_shape": 0.070}},
     ),
 )
-"""The experiments of Armani and Holz, ICRA 2024, section III, and their errors."""
+"""Experiments of Armani and Holz, ICRA 2024, section III, with their errors."""
 
 
 def _channel(channel: ChannelParams) -> Scenario:
@@ -189,11 +189,11 @@ ROBUSTNESS = (
         change=range_outliers,
     ),
 )
-"""What may go wrong where it is used: each case is cars-nlos with one thing changed."""
+"""Faults in practice: each case is cars-nlos with one change."""
 
 
 def _cars(n: int) -> Case:
-    """So many cars in a room that leaves each as much floor as three have."""
+    """Return a case of `n` cars, with the floor area per car that three cars have in cars-los."""
     scale = float(np.sqrt(max(n, 3) / 3))
     (x, y), (a, b) = CARS_LOS.room, CARS_LOS.ring
     scenario = replace(CARS_LOS, n_cars=n, room=(scale * x, scale * y), ring=(scale * a, scale * b))
@@ -227,4 +227,4 @@ SUITES: dict[str, Suite] = {
         ),
     )
 }
-"""By name."""
+"""Suites by name."""

@@ -1,7 +1,7 @@
-"""What is asked of a filter in a case, and whether it is reached.
+"""Accuracy targets of a filter in a case.
 
-Where the bound itself lies above what is asked, that cannot be reached: the target is `NEAR`
-times the bound there.
+If the bound exceeds a target, the target cannot be reached and is replaced by `NEAR` times the
+bound.
 """
 
 from __future__ import annotations
@@ -11,34 +11,34 @@ from dataclasses import dataclass
 from typing import Any
 
 NEAR = 1.10
-"""[-] So near to the bound is good enough where the bound is the limit."""
+"""[-] Factor on the bound where the bound is the limit."""
 BOUNDS = {"rmse_yaw": "bound_yaw", "rmse_shape": "bound_shape"}
-"""Figure to the bound on it."""
+"""Metric to its bound."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A figure next to what is asked of it, all in metres."""
+    """A metric and its target, all in metres."""
 
     figure: str
     asked: float
     limit: float
-    """What counts: what is asked, or `NEAR` times the bound."""
+    """Effective target: `asked`, or `NEAR` times the bound."""
     reached: float | None
 
     @property
     def by_bound(self) -> bool:
-        """Whether the bound lies above what is asked."""
+        """True if the bound exceeds the target."""
         return self.limit != self.asked
 
     @property
     def met(self) -> bool:
-        """Whether the figure is at most the limit."""
+        """True if the metric is at most the limit."""
         return self.reached is not None and self.reached <= self.limit
 
     @property
     def record(self) -> dict[str, Any]:
-        """Ready for JSON."""
+        """Record for JSON."""
         return {
             "figure": self.figure,
             "asked": self.asked,
@@ -49,11 +49,11 @@ class Outcome:
 
 
 def outcomes(asked: Mapping[str, float], figures: Mapping[str, Any]) -> list[Outcome]:
-    """Every target of one filter in one case.
+    """Return the outcomes of all targets of one filter in one case.
 
     Args:
-        asked: Figure to the most that it may be [m].
-        figures: Medians, the bounds among them; None where there is none.
+        asked: Metric to its target [m].
+        figures: Medians of metrics and bounds, None where undefined [m].
     """
     found = []
     for figure, most in asked.items():

@@ -1,4 +1,4 @@
-"""Tracking a recorded run: what `relpos track` does, as a function."""
+"""Tracking of a recorded run (`relpos track`)."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from tracking.whole_smoother import smooth_whole
 CSV_HZ = 20.0
 """[Hz] Rate of estimates.csv."""
 ERRORS = ("rmse", "rmse_yaw", "rmse_shape", "rmse_mirror")
-"""The errors of a run, in the order they are shown."""
+"""Errors of a run, in display order."""
 LAG = HorizonParams().delay
-"""[s] So much later is what smoothed estimates know."""
+"""[s] Lag of the fixed-lag smoother."""
 Smoothing = Literal["lag", "all"]
 N_CHUNKS = 50
-"""A log is tracked in so many pieces, so that progress can be shown."""
+"""Number of chunks in which a log is tracked, for progress reports."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,32 +48,32 @@ class TrackResult:
     log: Log
     filter: str
     estimate: TeamEstimate
-    """Over (time, pair), at `CSV_HZ`."""
+    """Estimates over (time, pair), at `CSV_HZ`."""
     truth_ij_w: F64
-    """True relative positions at those times, (time, pair, 3) [m]."""
+    """[m] True relative positions at the times of `estimate`, (time, pair, 3)."""
     has_truth: Bool
-    """(time, pair)"""
+    """True where `truth_ij_w` is known, (time, pair)."""
     score: Score
-    """At the truth's own times."""
+    """Score at the times of the ground truth."""
     nis: float
-    """Mean NIS of accepted ranges [-]."""
+    """[-] Mean NIS of accepted ranges."""
     n_rejected: int
-    """Ranges that the gate refused."""
+    """Ranges rejected by the gate."""
     skip: float
     """[s] Time after the first range that is not scored."""
     range_noise: float | None
     """[m] White noise of the ranges, given by the log or learned; None for other filters than
     `joint` and for a smoothed log."""
     realtime_factor: float
-    """[-] Duration of the log over the time that tracking took."""
+    """[-] Duration of the log divided by the run time of tracking."""
     bound: Bound | None = None
-    """The expected errors of an efficient estimator, where asked for."""
+    """Expected errors of an efficient estimator, if requested."""
     findings: tuple[Finding, ...] = ()
-    """What a reader should know of the recording and of what became of it."""
+    """Problems of the recording and of its tracking."""
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The figures, ready for JSON; what could not be scored is None."""
+        """Metrics for JSON; None where they could not be scored."""
         constellation, s = self.log.constellation, self.score
         pair_rmse = {
             pair_name(constellation, p): _number(s.pair_rmse[p])
@@ -109,7 +109,7 @@ class TrackResult:
 
     @property
     def expected(self) -> dict[str, float]:
-        """The bound under the names of its errors [m]; empty where it was not asked for."""
+        """Bounds by the names of the errors [m]; empty if not requested."""
         if self.bound is None:
             return {}
         return {name: float(getattr(self.bound, name)) for name in ERRORS if name != "rmse_mirror"}
@@ -126,24 +126,24 @@ def track_log(
     findings: Sequence[Finding] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> TrackResult:
-    """Track a recorded run and score it where there is truth.
+    """Track a recorded run and score it where ground truth exists.
 
     Args:
         log: A log, or its folder.
         filter: One of `tracking.filters.FILTERS`.
-        skip: Times until so many seconds after the first range are not scored.
-        smooth: Estimates know what was measured in the `LAG` after them, too ("lag"), or all that
-            was measured ("all", `tracking.whole_smoother`).
-        bound: The expected errors of an efficient estimator, kept next to those there are
+        skip: Time after the first range that is not scored [s].
+        smooth: Fixed-lag smoothing over `LAG` ("lag"), or smoothing over the whole log ("all",
+            `tracking.whole_smoother`); None for filtering.
+        bound: Expected errors of an efficient estimator, copied to the result
             (`tracking.metrics.bound.recorded_bound`).
-        params: What the tracker believes.
-        findings: What `tracking.findings.examine` found of the log already, or nothing, for a log
-            that is to be taken as it is; None examines it, and corrects clocks and gyroscopes.
-        progress: Called with the share done, 0 to 1.
+        params: Parameters of the tracker.
+        findings: Results of `tracking.findings.examine` for this log; an empty sequence uses the
+            log as it is; None examines it, and corrects clocks and gyroscopes.
+        progress: Called with the completed share, 0 to 1.
 
     Raises:
         LogError: The folder cannot be read, or estimates would be wrong (`refuse_errors`).
-        ConfigError: No such filter, or one that cannot smooth.
+        ConfigError: The filter does not exist or cannot smooth.
     """
     log = log if isinstance(log, Log) else read_log(log)
     if findings is None:
@@ -153,7 +153,7 @@ def track_log(
     params = params_for(log, params or TrackerParams())
     tracker = Tracker(constellation, params, filter=filter)
     first, last = log.t_range
-    # From whole multiples, so that large times stay on the grid.
+    # Integer multiples of the period, so that large times remain on the grid.
     grid = first + np.arange(int((last - first) * CSV_HZ) + 1) / CSV_HZ
     t_truth = log.truth.times()
     t_truth = t_truth[(t_truth >= first) & (t_truth <= last)]
@@ -218,12 +218,12 @@ def _in_parts(
     smooth: bool,
     progress: Callable[[float], None] | None,
 ) -> TeamEstimate:
-    """Estimates of a log, arrays over (time, ...); in pieces, so that progress can be shown."""
+    """Track a log in chunks with progress reports; return arrays over (time, ...)."""
     edges = np.linspace(block.t[0, 0], block.t[0, -1], N_CHUNKS + 1)[1:]
     edges[-1] = max(block.t[0, -1], t_out[-1])
     parts, event, out = [], 0, 0
     for k, edge in enumerate(edges):
-        # An estimate holds every event up to its time, so both are cut at the same edge.
+        # An estimate uses every event up to its time, so both are split at the same edge.
         next_event = int(np.searchsorted(block.t[0], edge, side="right"))
         next_out = int(np.searchsorted(t_out, edge, side="right"))
         chunk, times = slice(event, next_event), t_out[out:next_out]
@@ -238,7 +238,7 @@ def _in_parts(
 
 
 def _smoothed(tracker: Tracker, block: MeasurementBlock, chunk: slice, t_out: F64) -> TeamEstimate:
-    """Estimates that know what was measured in the `LAG` after them; events of a chunk handled."""
+    """Track the events of a chunk; return estimates smoothed with the next `LAG` of events."""
     event, found = chunk.start, []
     for t in t_out:
         now, later = np.searchsorted(block.t[0], [t, t + LAG], side="right")
@@ -254,13 +254,13 @@ def _smoothed(tracker: Tracker, block: MeasurementBlock, chunk: slice, t_out: F6
 
 
 def pair_name(constellation: Constellation, pair: int) -> str:
-    """A pair by the ids of its nodes, "1-2"."""
+    """Return the name of a pair from the ids of its nodes, "1-2"."""
     i, j = constellation.pairs[pair]
     return f"{constellation.ids[i]}-{constellation.ids[j]}"
 
 
 def estimates_csv(estimate: TeamEstimate) -> str:
-    """A run as text: one row per time and pair that has an estimate."""
+    """Return a run as CSV: one row per time and pair with an estimate."""
     constellation = estimate.constellation
     ids = [(constellation.ids[i], constellation.ids[j]) for i, j in constellation.pairs]
     text = io.StringIO()
@@ -283,7 +283,7 @@ def estimates_csv(estimate: TeamEstimate) -> str:
 
 
 def _join(constellation: Constellation, parts: Sequence[TeamEstimate]) -> TeamEstimate:
-    """Runs one after another, the env axis removed."""
+    """Concatenate runs in time and remove the env axis."""
     names = TeamEstimate.__slots__[1:]
     joined = (np.concatenate([getattr(part, n)[0] for part in parts]) for n in names)
     return TeamEstimate(constellation, *joined)
@@ -295,5 +295,5 @@ def _at_times(estimate: TeamEstimate, chosen: Bool) -> TeamEstimate:
 
 
 def _number(value: float | None) -> float | None:
-    """A finite number, or None."""
+    """Return a finite number, or None."""
     return None if value is None or not np.isfinite(value) else float(value)

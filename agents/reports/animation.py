@@ -1,4 +1,4 @@
-"""An animation of a drive, drawn by the browser from numbers: small, smooth, no video codec."""
+"""Animation of a drive, rendered by the browser from data: small, and without a video codec."""
 
 from __future__ import annotations
 
@@ -112,22 +112,22 @@ requestAnimationFrame(tick);
 
 
 def animation_markup(frames: dict[str, Any]) -> str:
-    """The player with its data.
+    """Return the markup of a player of one drive.
 
     Args:
-        frames: room, car size, dt, and lists over frames; see
+        frames: Room, car size, dt, and lists over frames; see
             `agents.simulation.frames.FrameRecorder`.
     """
     return player_markup({"": frames})
 
 
 def player_markup(drives: Mapping[str, dict[str, Any]], *, running: bool = True) -> str:
-    """A player of one drive at a time, with a choice between them if there are several.
+    """Return the markup of a player, with a selection list if there are several drives.
 
     Args:
-        drives: Frames by what they are called; see `animation_markup`.
-        running: Whether it plays at once.
+        drives: Frames by title; see `animation_markup`.
+        running: True to start playing on load.
     """
-    # "</" would end the script in which the names stand.
+    # "</" in a title would end the script element.
     data = json.dumps(list(drives.items()), separators=(",", ":")).replace("</", "<\\/")
     return _SCRIPT.replace("__RUNNING__", json.dumps(running)).replace("__DATA__", data)

@@ -1,4 +1,4 @@
-"""The report of a calibration: what was measured, what was left out, what is left over."""
+"""The report of a calibration: results, outliers and residual errors."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_NODES = 6
-"""So many nodes are drawn; the table has all."""
+"""Largest number of nodes in figures; tables have all."""
 MAX_POINTS = 4000
-"""So many points of a cloud are drawn."""
+"""Approximate number of points per scatter plot."""
 
 IMU_HEADER = ["node", "rest s", "gyr offset mrad/s", "+-", "acc offset m/s2", "acc scale", "from"]
 MAG_HEADER = ["node", "from", "offset uT", "field uT", "seen", "uneven before", "after"]
@@ -28,7 +28,7 @@ UWB_HEADER = ["node", "offset b [m]"]
 
 
 def calibration_report(r: CalibrateResult) -> str:
-    """One page."""
+    """Return the report as one HTML page."""
     page = Page("Calibration report", f"Sensor errors found in {r.log.name}")
     if r.imu:
         page.heading("Gyroscope and accelerometer")
@@ -55,7 +55,7 @@ def calibration_report(r: CalibrateResult) -> str:
 
 
 def imu_rows(r: CalibrateResult) -> list[list[str]]:
-    """A row a node, as `IMU_HEADER`."""
+    """Return one row per node, as `IMU_HEADER`."""
     return [
         [
             str(n),
@@ -71,7 +71,7 @@ def imu_rows(r: CalibrateResult) -> list[list[str]]:
 
 
 def mag_rows(r: CalibrateResult) -> list[list[str]]:
-    """A row a node, as `MAG_HEADER`."""
+    """Return one row per node, as `MAG_HEADER`."""
     return [
         [
             str(n),
@@ -87,13 +87,13 @@ def mag_rows(r: CalibrateResult) -> list[list[str]]:
 
 
 def uwb_rows(r: CalibrateResult) -> list[list[str]]:
-    """A row a node, as `UWB_HEADER`."""
+    """Return one row per node, as `UWB_HEADER`."""
     offset = r.uwb.calibration.offset if r.uwb else {}
     return [[str(n), f"{b:+.3f}"] for n, b in offset.items()]
 
 
 def uwb_text(r: CalibrateResult) -> str:
-    """What was found of the ranges, in words."""
+    """Return a summary of the UWB calibration as text, empty if there is none."""
     u = r.uwb
     if u is None:
         return ""
@@ -114,7 +114,7 @@ def uwb_text(r: CalibrateResult) -> str:
 
 
 def refusals(r: CalibrateResult) -> list[str]:
-    """A line for each node that was not calibrated."""
+    """Return one line per node that was not calibrated."""
     return [f"Node {n} is not calibrated: {why}." for n, why in r.refused.items()]
 
 
@@ -169,7 +169,7 @@ def _clouds(r: CalibrateResult) -> Figure:
 def _cloud(
     ax: Axes, one: MagResult, before: np.ndarray, after: np.ndarray, *, circle: bool
 ) -> None:
-    """Readings in one plane."""
+    """Plot magnetometer readings in one plane, before and after calibration."""
     thin = slice(None, None, 1 + len(before) // MAX_POINTS)
     ax.plot(*before[thin].T, ".", color="0.7", ms=2, rasterized=True, label="before")
     ok = one.inlier[thin]
@@ -179,7 +179,7 @@ def _cloud(
     if circle:
         _circle(ax, one.field)
     ax.plot(0, 0, "k+", ms=9)
-    # Outliers may lie beyond the frame.
+    # Outliers may be outside the axes.
     reach = 1.1 * float(np.abs([before[one.inlier], after[one.inlier]]).max())
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
 

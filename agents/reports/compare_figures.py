@@ -1,4 +1,4 @@
-"""Pictures of a comparison: figures with intervals, error over time, scatter, ratios."""
+"""Figures of a comparison: metrics with intervals, error over time, scatter, ratios."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ LABELS = {
 WIDE = 4.0
 """[-] Ratios that span more than this factor are drawn on a logarithmic axis."""
 COLUMNS = 3
-"""[-] Panels side by side."""
+"""[-] Panels per row."""
 
 
 @in_style
 def figures(result: CompareResult) -> dict[str, tuple[str, Figure, str]]:
-    """Title, picture and caption by file name."""
+    """Return title, figure and caption by file name."""
     settle = result.rows[0].setting.settle
     drawn = {
         "compare-figures.svg": (
@@ -70,12 +70,12 @@ def figures(result: CompareResult) -> dict[str, tuple[str, Figure, str]]:
 
 
 def _measured(result: CompareResult) -> list[str]:
-    """Figures that anybody has."""
+    """Return the metrics that are defined for at least one row."""
     return [name for name in FIGURES if any(row.means[name] for row in result.rows)]
 
 
 def _colours(result: CompareResult) -> dict[str, str]:
-    """A colour for every contender, the same in all pictures."""
+    """Return a colour per candidate, the same in all figures."""
     return {c.label: COLOURS[n % len(COLOURS)] for n, c in enumerate(result.contenders)}
 
 
@@ -110,7 +110,7 @@ def _bars(result: CompareResult) -> Figure:
 
 
 def _bar(ax: Axes, y: int, found: Interval | None, scale: float, colour: str, *, bar: bool) -> None:
-    """One bar, or a dot where the axis does not begin at 0, with its interval."""
+    """Draw one bar, or a dot if the axis does not begin at 0, with its interval."""
     if found is None:
         return
     if found.ends is not None:
@@ -122,7 +122,7 @@ def _bar(ax: Axes, y: int, found: Interval | None, scale: float, colour: str, *,
 
 
 def _limits(name: str, found: Sequence[Interval | None]) -> tuple[float, float]:
-    """Where the axis of a figure begins and ends."""
+    """Return the limits of the axis of a metric."""
     if name == "time_in_formation":
         return 0.0, 100.0
     ends = [e for m in found if m is not None for e in (m.ends or [m.value])] or [0.0]
@@ -134,12 +134,12 @@ def _limits(name: str, found: Sequence[Interval | None]) -> tuple[float, float]:
 
 
 def _scale(name: str) -> float:
-    """Shares are drawn in percent."""
+    """Return the factor of a metric for display: 100 for shares, drawn in percent."""
     return 100.0 if LABELS[name].endswith("[%]") else 1.0
 
 
 def _panels(result: CompareResult, width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """A picture with a panel for each scenario."""
+    """Return a figure with one panel per scenario."""
     names = result.scenarios
     columns = min(len(names), COLUMNS)
     lines = -(-len(names) // columns)
@@ -173,7 +173,7 @@ def _over_time(result: CompareResult) -> Figure:
 
 
 def _quartiles(row: Row) -> tuple[np.ndarray, np.ndarray]:
-    """Times (cycle) and quartiles of the error over the episodes that still go on (3, cycle)."""
+    """Return times (step,) and quartiles of the error over running episodes (3, step)."""
     cycles = max(len(e.error) for e in row.episodes)
     error = np.full((len(row.episodes), cycles), np.nan)
     for line, episode in zip(error, row.episodes, strict=True):
@@ -247,14 +247,14 @@ def _ratios(result: CompareResult) -> Figure:
 
 
 def _episodes(result: CompareResult) -> str:
-    """How many episodes contenders have."""
+    """Return the number of episodes per candidate as text."""
     counts = [len(row.episodes) for row in result.rows]
     low, high = min(counts), max(counts)
     return f"{high} episodes" if low == high else f"{low} to {high} episodes"
 
 
 def _finish(figure: Figure, label: str, title: str) -> None:
-    """Label the panels at the left, and one legend above all."""
+    """Label the panels of the first column and draw one common legend."""
     for ax in figure.axes:
         spec = ax.get_subplotspec()
         if spec is not None and spec.is_first_col():
@@ -271,7 +271,7 @@ def _finish(figure: Figure, label: str, title: str) -> None:
 
 
 def _legend_of(axes: Sequence[Axes]) -> tuple[list[Artist], list[str]]:
-    """One entry for every label of the panels."""
+    """Return handles and labels of the panels, each label once."""
     entries: dict[str, Artist] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):

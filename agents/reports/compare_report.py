@@ -1,4 +1,4 @@
-"""The report of a comparison: table, pictures, and the median episode of every contender."""
+"""The report of a comparison: tables, figures, and the median episode of every candidate."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HEADER = (
 
 
 def rows(result: CompareResult, scenario: str) -> list[list[str]]:
-    """Cells of the table of one scenario, one line for each driver and mode of observations."""
+    """Return the table of one scenario, one row per driver and observation mode."""
     return [_cells(r) for r in result.records if r["scenario"] == scenario]
 
 
@@ -51,11 +51,11 @@ SHORT_HEADER = (
 )  # fmt: skip
 """Names of the columns of `short_rows`."""
 _LONGEST = 36
-"""[-] Letters of a driver in a terminal, so that no figure is cut."""
+"""[-] Longest name of a driver in a terminal, so that no number is truncated."""
 
 
 def short_rows(result: CompareResult, scenario: str) -> list[list[str]]:
-    """Cells of the table of one scenario, for a terminal: without energy and time in contact."""
+    """Return the table of one scenario for a terminal, without energy and time in contact."""
     lines = []
     for row, cells in zip(result.of(scenario), rows(result, scenario), strict=True):
         shown = f" on {row.contender.sees}"
@@ -69,7 +69,7 @@ def short_rows(result: CompareResult, scenario: str) -> list[list[str]]:
 
 
 def notes(result: CompareResult) -> list[str]:
-    """What a reader of the table must know, a line each."""
+    """Return notes on the table, one per line."""
     setting = result.rows[0].setting
     by: dict[str, list[str]] = {}
     for scenario in result.scenarios:
@@ -102,11 +102,11 @@ def notes(result: CompareResult) -> list[str]:
 def compare_files(
     result: CompareResult, films: Sequence[dict[str, Any]] = ()
 ) -> dict[str, str | bytes]:
-    """Everything that goes into the folder, by name.
+    """Return the files of a comparison by name.
 
     Args:
-        result: What was found.
-        films: Frames of the median episode of every row; real cars have none.
+        result: Result of the comparison.
+        films: Frames of the median episode of every row; empty for real cars.
     """
     drawn = figures.figures(result)
     names = ", ".join(dict.fromkeys(c.called for c in result.contenders))
@@ -133,17 +133,17 @@ def compare_files(
 
 
 def _title(row: Row) -> str:
-    """What an episode is called in the player."""
+    """Return the title of an episode in the player."""
     episode = row.median_episode
     error = metres(episode.formation_error)
     return f"{row.contender.label}: seed {episode.seed}, formation error {error} m"
 
 
 def _number(value: float | None, digits: int) -> str:
-    """A number for a table, or a dash."""
+    """Format a number for a table, or a dash."""
     return "-" if value is None else f"{value:.{digits}f}"
 
 
 def _ends(ends: Sequence[float] | None) -> str:
-    """An interval for a table, or a dash."""
+    """Format an interval for a table, or a dash."""
     return "-" if ends is None else f"{ends[0]:.3f}{_TO}{ends[1]:.3f}"

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 def demo_report(result: DemoResult, missing: Sequence[str] = ()) -> str:
-    """One page.
+    """Return the report as one HTML page.
 
     Args:
-        result: What is shown.
-        missing: Filters that will be in it later.
+        result: Result of the demonstration.
+        missing: Filters whose results are not available yet.
     """
     page = Page(
         "Three cars, one formation, no anchors"

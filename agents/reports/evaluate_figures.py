@@ -1,4 +1,4 @@
-"""Pictures of an evaluation: error over time, consistency, error over seeds, and over nodes."""
+"""Figures of an evaluation: error over time, consistency, error over seeds, and over nodes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LIKELY = 0.95
 
 @in_style
 def figures(result: EvaluateResult) -> dict[str, tuple[str, Figure, str]]:
-    """Title, picture and caption by file name."""
+    """Return title, figure and caption by file name."""
     has_paper = any(c.paper is not None for c in result.cases)
     paper = " Dotted: the paper's error of that filter." if has_paper else ""
     drawn = {
@@ -66,7 +66,7 @@ def figures(result: EvaluateResult) -> dict[str, tuple[str, Figure, str]]:
 def _panels(
     result: EvaluateResult, width: float, height: float
 ) -> tuple[Figure, Iterator[tuple[Axes, list[CaseResult]]]]:
-    """A picture with a panel for each case."""
+    """Return a figure with one panel per case."""
     cases = result.by_case
     columns = min(len(cases), 3)
     lines = -(-len(cases) // columns)
@@ -97,7 +97,7 @@ def _over_time(result: EvaluateResult) -> Figure:
 
 
 def _quantiles(values: np.ndarray, at: tuple[float, ...]) -> np.ndarray:
-    """Quantiles over the runs, NaN where no run says anything, (quantile, bin)."""
+    """Return quantiles over the runs, NaN in bins without data, (quantile, bin)."""
     out = np.full((len(at), values.shape[1]), np.nan)
     some = np.isfinite(values).any(axis=0)
     out[:, some] = np.nanquantile(values[:, some], at, axis=0)
@@ -133,8 +133,8 @@ def _nees(result: EvaluateResult) -> Figure:
     figure, panels = _panels(result, 3.7, 2.9)
     highest = 3.0
     for ax, rows in panels:
-        # Errors of nodes that are alike and independent: the mean over all pairs is that of
-        # n - 1 independent positions.
+        # For independent, identically distributed errors of nodes, the mean over all pairs is
+        # that of n - 1 independent positions.
         dimensions = 3 if rows[0].case.scenario.name.startswith("human") else 2
         free = dimensions * (rows[0].runs[0].nodes - 1) * result.seeds
         low, high = chi_square_band(free, 1, LIKELY)
@@ -147,7 +147,7 @@ def _nees(result: EvaluateResult) -> Figure:
             mean = np.nanmean(nees[:, some], axis=0)
             ax.plot(t, mean, color=colour, lw=1.2, label=c.filter)
             top = max(top, float(mean[t > SKIP].max(initial=0.0)))
-        # What is off before the scored time would squeeze all the rest.
+        # Large values before the scored time would compress the axis.
         highest = max(highest, 1.5 * top)
         ax.set(yscale="log", xlim=(0, result.seconds), xlabel="t [s]", ylim=(0.2, highest))
         plain_ticks(ax.yaxis, (1.0, 3.0))
@@ -203,7 +203,7 @@ def _scaling(result: EvaluateResult) -> Figure:
 
 
 def _finish(figure: Figure, label: str, legend: str = "") -> None:
-    """Label the panels at the left, and one legend of that title above all."""
+    """Label the panels of the first column and draw one common legend with the title `legend`."""
     for ax in figure.axes:
         spec = ax.get_subplotspec()
         if spec is not None and spec.is_first_col():

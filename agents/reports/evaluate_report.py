@@ -1,4 +1,4 @@
-"""The report of an evaluation: figures next to the paper's, and pictures of all runs."""
+"""The report of an evaluation: metrics, those of the paper, and figures of all runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from agents.reports.style import svg
 from tracking.metrics.integrity import LIMIT, SIGMAS
 
 TARGETS = ["case", "filter", "figure", "reached", "asked", "target", ""]
-"""Names of the columns of targets."""
+"""Names of the columns of the table of targets."""
 _FIGURES = [
     "rmse", "rmse_yaw", "rmse_shape", "bound_yaw", "yaw/b", "shape/b",
     "gospa", "lost", "ok", "wrong", "worst s", "nees", "nis", "us",
@@ -22,17 +22,17 @@ _FIGURES = [
 
 
 def header(result: EvaluateResult) -> list[str]:
-    """Names of the columns; the paper's only where it has a figure."""
+    """Return the names of the columns; with the paper's only if it reports an error."""
     return ["case", "filter", *(["paper"] if has_paper(result) else []), *_FIGURES]
 
 
 def has_paper(result: EvaluateResult) -> bool:
-    """Whether the paper reports an error of any case."""
+    """Return whether the paper reports an error of any case."""
     return any(c.paper is not None for c in result.cases)
 
 
 def rows(result: EvaluateResult) -> list[list[str]]:
-    """Cells of the table, one line for each case and filter."""
+    """Return the table, one row per case and filter."""
     cells = []
     before = ""
     for r in result.records:
@@ -51,7 +51,7 @@ def rows(result: EvaluateResult) -> list[list[str]]:
 
 
 def notes(result: EvaluateResult) -> list[str]:
-    """What a reader of the table must know, a line each."""
+    """Return notes on the table, one per line."""
     lines = [
         f"{result.seeds} seeds of {result.seconds:g} s, scored from {SKIP:g} s after the first "
         "range. Errors [m], the bound and the ratios to it are medians over the seeds.",
@@ -74,7 +74,7 @@ def notes(result: EvaluateResult) -> list[str]:
 
 
 def target_rows(result: EvaluateResult) -> list[list[str]]:
-    """Cells of the table of targets, one line for each."""
+    """Return the table of targets, one row per target."""
     return [
         [
             case.case.name,
@@ -91,7 +91,7 @@ def target_rows(result: EvaluateResult) -> list[list[str]]:
 
 
 def evaluate_files(result: EvaluateResult) -> dict[str, str | bytes]:
-    """Everything that goes into the folder, by name."""
+    """Return the files of an evaluation by name."""
     drawn = figures.figures(result)
     page = Page(
         f"Evaluation: {result.suite.title.lower()}",
@@ -123,7 +123,7 @@ def evaluate_files(result: EvaluateResult) -> dict[str, str | bytes]:
 
 
 def _number(value: float | None) -> str:
-    """A number of about 1 for a table, or a dash."""
+    """Format a number of about 1 for a table, or a dash."""
     if value is None:
         return "-"
     return f"{value:.2f}" if value < 100.0 else f"{value:.0f}"

@@ -1,4 +1,4 @@
-"""A moving picture of a drive, for pages that show no more than images."""
+"""Animated GIF of a drive, for pages that only show images."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from typing import Any
 from PIL import Image
 
 COLOURS, WIDTH = 48, 640
-"""Of a picture, and its width in pixels; few make small files."""
+"""Number of colours, and largest width [px]; small values for small files."""
 
 
 class Gif:
-    """A GIF that repeats for ever; pictures are made small as they come."""
+    """A GIF in an endless loop; images are scaled down when they are added."""
 
     def __init__(self, *, every: int, interval: float) -> None:
-        """Prepare.
+        """Create an empty animation.
 
         Args:
-            every: One picture of this number is kept.
-            interval: Between two pictures that are added [s].
+            every: Every n-th image is kept.
+            interval: Time between two added images [s].
         """
         self._every, self._milliseconds = every, round(1000.0 * interval * every)
         self._n, self._kept = 0, list[Image.Image]()
 
     def add(self, picture: Any) -> None:
-        """Add a picture, uint8 (height, width, 3)."""
+        """Add an image, uint8 (height, width, 3)."""
         if self._n % self._every == 0:
             image = Image.fromarray(picture)
             scale = min(1.0, WIDTH / image.width)
@@ -35,7 +35,7 @@ class Gif:
         self._n += 1
 
     def to_bytes(self) -> bytes:
-        """The file, of one or more pictures."""
+        """Return the file; at least one image is required."""
         (first, *others), out = self._kept, io.BytesIO()
         first.save(
             out, "GIF", save_all=True, append_images=others, duration=self._milliseconds,

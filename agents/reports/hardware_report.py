@@ -1,4 +1,4 @@
-"""The report of emulated drives: where the cars went, and their errors next to the simulator's."""
+"""The report of emulated drives: trajectories, and errors compared with the simulator."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HEADER = ("seed", "through the bridge [m]", "simulator [m]", "ratio", "collision
 
 
 def demo_rows(results: Sequence[HardwareDemoResult]) -> list[list[str]]:
-    """One row a drive, as `HEADER`, and one for the mean of those that have both errors."""
+    """Return one row per drive, as `HEADER`, and the mean of the drives with both errors."""
     rows = []
     for result in results:
         s = result.summary
@@ -49,7 +49,7 @@ def demo_rows(results: Sequence[HardwareDemoResult]) -> list[list[str]]:
 
 
 def ratio_record(results: Sequence[HardwareDemoResult]) -> dict[str, Any]:
-    """The ratio of the means as a record."""
+    """Return the ratio of the means as a record."""
     found = error_ratio(results)
     return {
         "result": "hardware-demo-ratio",
@@ -60,7 +60,7 @@ def ratio_record(results: Sequence[HardwareDemoResult]) -> dict[str, Any]:
 
 
 def hardware_report(results: Sequence[HardwareDemoResult], room: tuple[float, float]) -> str:
-    """One page."""
+    """Return the report as one HTML page."""
     first = results[0]
     way = "in memory, under a virtual clock" if first.virtual else "over pseudo terminals"
     page = Page(
@@ -83,7 +83,7 @@ def hardware_report(results: Sequence[HardwareDemoResult], room: tuple[float, fl
 
 @in_style
 def drive_figure(result: HardwareDemoResult, room: tuple[float, float]) -> Figure:
-    """Ways of the cars, and errors over time."""
+    """Draw the trajectories of the cars, and errors over time."""
     figure = new_figure(11, 3.8)
     ways, errors = figure.subplots(1, 2, width_ratios=(1, 2.2))
     _ways(ways, result, room)

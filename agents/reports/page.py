@@ -44,11 +44,11 @@ class Page:
         self._parts.append(f"<h2>{html.escape(text)}</h2>")
 
     def text(self, text: str) -> None:
-        """A paragraph."""
+        """Add a paragraph."""
         self._parts.append(f"<p>{html.escape(text)}</p>")
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """A table of text cells."""
+        """Add a table of text cells."""
         head = "".join(f"<th>{html.escape(cell)}</th>" for cell in header)
         body = "".join(
             "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
@@ -57,7 +57,7 @@ class Page:
         self._parts.append(f"<section><table><tr>{head}</tr>{body}</table></section>")
 
     def figure(self, figure: Figure, caption: str) -> None:
-        """A matplotlib figure as an embedded picture."""
+        """Add a matplotlib figure as an embedded SVG."""
         data = base64.b64encode(svg(figure)).decode()
         key = f"<p class='key'>{html.escape(caption)}</p>"
         alt = html.escape(caption, quote=True)
@@ -66,11 +66,11 @@ class Page:
         )
 
     def raw(self, markup: str) -> None:
-        """Markup made elsewhere in this package."""
+        """Add markup without escaping; only for markup generated in this package."""
         self._parts.append(f"<section>{markup}</section>")
 
     def render(self) -> str:
-        """The whole page."""
+        """Return the page as HTML."""
         body = "\n".join(self._parts)
         return (
             "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
@@ -81,10 +81,10 @@ class Page:
 
 
 def percent(share: float | None, digits: int = 0) -> str:
-    """A share for a table or a sentence, or a dash."""
+    """Format a share in percent, or a dash."""
     return "-" if share is None else f"{100.0 * share:.{digits}f} %"
 
 
 def metres(value: float | None) -> str:
-    """A length for a table, or a dash."""
+    """Format a length [m] for a table, or a dash."""
     return "-" if value is None or value != value else f"{value:.3f}"

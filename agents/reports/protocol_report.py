@@ -1,4 +1,4 @@
-"""The report of the protocol's experiments: ranging frequency over time, recovery, rates."""
+"""The report of the protocol experiments: ranging frequency over time, recovery, rates."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAPER_MS = {"responder-join": 12.3, "responder-leave": 12.3, "initiator-loss": 733.4}
-"""Mean recovery times of Armani and Holz, ICRA 2024."""
+"""[ms] Mean recovery times of Armani and Holz, ICRA 2024."""
 
 
 PICTURES = ("protocol-timeline.svg", "protocol-recovery.svg", "protocol-rates.svg")
@@ -24,13 +24,13 @@ PICTURES = ("protocol-timeline.svg", "protocol-recovery.svg", "protocol-rates.sv
 
 @in_style
 def figures(result: ProtocolResult) -> dict[str, Figure]:
-    """The pictures by name."""
+    """Return the figures by file name."""
     drawn = _timeline(result), _recovery(result), _rates(result)
     return dict(zip(PICTURES, drawn, strict=True))
 
 
 def protocol_report(result: ProtocolResult, pictures: dict[str, Figure]) -> str:
-    """One page with the pictures of `figures`."""
+    """Return the report as one HTML page, with the figures of `figures`."""
     page = Page(
         "The ranging protocol",
         "Nodes that run the real session in a simulated air: every message, clock and collision.",
@@ -61,7 +61,7 @@ CLOCK_HEADER = ["nodes", "slot", "ppm", "bias [cm]", "std, ratio to perfect", "u
 
 
 def rate_rows(result: ProtocolResult) -> list[list[str]]:
-    """Cells of the table of rates."""
+    """Return the rows of the table of rates."""
     return [
         [
             r["phy"],
@@ -75,7 +75,7 @@ def rate_rows(result: ProtocolResult) -> list[list[str]]:
 
 
 def recovery_rows(result: ProtocolResult) -> list[list[str]]:
-    """Cells of the table of recovery times."""
+    """Return the rows of the table of recovery times."""
     return [
         [
             r["event"],
@@ -90,7 +90,7 @@ def recovery_rows(result: ProtocolResult) -> list[list[str]]:
 
 
 def clock_rows(result: ProtocolResult) -> list[list[str]]:
-    """Cells of the table of clock errors."""
+    """Return the rows of the table of clock errors."""
     return [
         [
             str(r["n"]),

@@ -1,4 +1,4 @@
-"""The one style of all figures, and figures as pictures."""
+"""Common style of all figures, and their export as SVG."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ COLOURS = (
     "#2563eb", "#d97706", "#059669", "#dc2626", "#7c3aed", "#0891b2", "#be185d", "#65a30d",
     "#475467", "#92400e",
 )  # fmt: skip
-"""Of what is compared, in order; C0 to C9 in a figure."""
+"""Colour cycle, C0 to C9 in a figure."""
 BAND = 0.18
-"""[-] Opacity of a band round a curve."""
+"""[-] Opacity of a band around a curve."""
 _STYLE = {
     "axes.axisbelow": True,
     "axes.edgecolor": "0.4",
@@ -39,7 +39,7 @@ _STYLE = {
 
 
 def in_style(draw: Callable[P, R]) -> Callable[P, R]:
-    """Let a function draw in the style."""
+    """Decorate a drawing function to use the common style."""
 
     @wraps(draw)
     def styled(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -53,14 +53,14 @@ def in_style(draw: Callable[P, R]) -> Callable[P, R]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of a size [inch]."""
+    """Return an empty figure of a size [inch]."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def plain_ticks(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
-    """Numbers at the given steps of every decade: a logarithmic axis may span less than one."""
+    """Label a logarithmic axis at multiples of every decade, since it may span less than one."""
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullLocator
 
     axis.set_major_locator(LogLocator(subs=subs, numticks=30))
@@ -70,7 +70,7 @@ def plain_ticks(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
 
 @in_style
 def svg(figure: Figure) -> bytes:
-    """A figure as SVG, the same bytes for the same figure."""
+    """Return a figure as SVG, reproducible byte for byte."""
     raw = io.BytesIO()
     figure.savefig(raw, format="svg", metadata={"Date": None})
     return raw.getvalue()

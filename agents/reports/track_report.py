@@ -1,4 +1,4 @@
-"""The report of tracked logs: trajectories, errors with their 3-sigma bands, ranges."""
+"""The report of tracked logs: trajectories, errors with 3-sigma bands, ranges."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_PAIRS = 6
-"""So many pairs are drawn; the table has all."""
+"""Largest number of pairs in figures; tables have all."""
 
 
 def track_report(results: Sequence[TrackResult]) -> str:
-    """One page over all logs and filters."""
+    """Return the report of all logs and filters as one HTML page."""
     page = Page("Tracking report", "Relative positions from UWB ranges and inertial sensors")
     page.heading("Errors")
     page.text(
@@ -96,7 +96,7 @@ def _pairs_to_draw(r: TrackResult) -> list[int]:
 
 
 def _known(r: TrackResult, p: int) -> np.ndarray:
-    """Times at which a pair has an estimate."""
+    """Return the mask of times at which a pair has an estimate."""
     known: np.ndarray = ~np.isin(r.estimate.status[:, p], (Status.ABSENT, Status.STARTING))
     return known
 

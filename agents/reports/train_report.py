@@ -20,12 +20,12 @@ Rows = Sequence[dict[str, Any]]
 
 
 def train_report(config: TrainConfig, rows: Rows, choice: Choice) -> str:
-    """The page.
+    """Return the report as one HTML page.
 
     Args:
-        config: Of the runs.
-        rows: What was measured after every leg of each, with its seed.
-        choice: Of the policy that is kept.
+        config: Configuration of the runs.
+        rows: Records of all evaluation intervals of all runs, with seeds.
+        choice: Result of the model selection.
     """
     env, last = config.env, rows[-1]
     seeds = list(dict.fromkeys(r["seed"] for r in rows))
@@ -87,7 +87,7 @@ def train_report(config: TrainConfig, rows: Rows, choice: Choice) -> str:
 
 
 def _measured(row: dict[str, Any]) -> list[str]:
-    """What both tables tell of a policy."""
+    """Return the metrics of a policy for both tables."""
     return [
         f"{row['return']:.3f}",
         metres(row["formation_error"]),
@@ -102,10 +102,10 @@ def _seeds(seeds: Sequence[int]) -> str:
 
 @in_style
 def curves(runs: Sequence[tuple[str, Rows]]) -> Figure:
-    """Return, formation error and collisions over the frames of some runs.
+    """Draw return, formation error and collisions over the agent steps of runs.
 
     Args:
-        runs: Label and rows of each; runs of equal labels are drawn alike.
+        runs: Label and records of each run; runs with equal labels have the same style.
     """
     figure = new_figure(10.0, 3.4)
     axes = figure.subplots(1, 3)

@@ -1,4 +1,4 @@
-"""A run that begins with the network of a policy, not with random weights."""
+"""Initialisation of a run with the network of a policy."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from relpos_env.interface.observations.base import F32
 
 
 def begin_with(policy: SwarmPolicy, config: TrainConfig) -> None:
-    """Give the actor the weights of the policy `config.begin`; the critic keeps its own.
+    """Copy the weights of the policy `config.begin` into the actor; the critic is left unchanged.
 
-    An exporter folds and transposes some weights and names them as it likes. So an actor of random
-    weights is exported as well: where each of its weights went, that of the policy comes from.
+    The ONNX exporter folds, transposes and renames weights. An actor with random weights is
+    therefore exported as well, and each weight is matched by its values in that network.
 
     Raises:
-        PolicyError: There is no such policy, or it is damaged.
-        UsageError: It sees something else, or its network has another shape.
+        PolicyError: The policy does not exist or is damaged.
+        UsageError: Its observation layout or the shape of its network differs.
     """
     layout = layout_of(config)
     if load_policy(config.begin).layout.digest != layout.digest:
@@ -37,7 +37,7 @@ def begin_with(policy: SwarmPolicy, config: TrainConfig) -> None:
     actor = Actor(policy)
     with torch.no_grad():
         for weight in actor.parameters():
-            weight.uniform_()  # biases, which begin as zeros, can so be told apart
+            weight.uniform_()  # distinguishes biases, which are initialised with zeros
     given = _arrays(read_bounded(network_file, MOST_NETWORK))
     ours = _arrays(to_onnx(actor, layout.size))
     if {k: a.shape for k, a in ours.items()} != {k: a.shape for k, a in given.items()}:
@@ -51,7 +51,7 @@ def begin_with(policy: SwarmPolicy, config: TrainConfig) -> None:
 
 
 def _arrays(network: bytes) -> dict[str, F32]:
-    """The constants of a network by name."""
+    """Return the constants of a network by name."""
     graph = onnx.load_from_string(network).graph
     return {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
 
@@ -59,7 +59,7 @@ def _arrays(network: bytes) -> dict[str, F32]:
 def _counterpart(
     weight: torch.Tensor, ours: dict[str, F32], given: dict[str, F32], policy: str
 ) -> torch.Tensor:
-    """The given weight that stands where ours went."""
+    """Return the given weight that corresponds to a weight of our actor."""
     own = weight.detach().numpy()
     for name, array in ours.items():
         if np.array_equal(array, own):

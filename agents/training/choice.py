@@ -1,6 +1,6 @@
-"""Which policy is kept: those that may be it drive once more, in episodes that are new to them.
+"""Model selection: the best and the last policy of each run are evaluated on new episodes.
 
-The best of many legs on a few episodes is partly luck, and so is the better of two runs.
+The maximum over many evaluations on a few episodes, or over two runs, is biased upwards.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from agents.training.run_folder import BEST, LAST, RunFolder, restore_weights
 
 FILE = "choice.json"
 FIRST_SEED = 100_000
-"""Episodes that decide have seeds from here on, never used otherwise."""
+"""First seed of the selection episodes; these seeds are used for nothing else."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """What is kept, and why."""
+    """The selected policy and the evaluations of all candidates."""
 
     run: Path
-    """Folder of its run."""
+    """Folder of the run."""
     weights: str
-    """File with its weights in there."""
+    """Name of the file with the weights in that folder."""
     measured: dict[str, Any]
-    """Its row."""
+    """Evaluation of the selected policy, one of `rows`."""
     rows: list[dict[str, Any]]
-    """What was measured of all that might have been it: seed and leg too."""
+    """Evaluations of all candidates, with seed and evaluation interval."""
 
 
 def choose(config: TrainConfig, runs: Sequence[Path]) -> Choice:
-    """Find the policy with the highest return among the best and the last of finished runs.
+    """Select the policy with the highest return among the best and the last of finished runs.
 
     Args:
-        config: Of the runs, but for the seed.
-        runs: Their folders.
+        config: Configuration of the runs, apart from the seed.
+        runs: Folders of the runs.
 
     Raises:
         UsageError: A run is damaged or not finished.
@@ -74,10 +74,10 @@ def choose(config: TrainConfig, runs: Sequence[Path]) -> Choice:
 
 
 def keep_choice(folder: Path, choice: Choice) -> None:
-    """Note in the folder of the runs, or of the one run, what was chosen.
+    """Write the selected policy to the folder of the runs, or of the only run.
 
     Raises:
-        UsageError: It cannot be written to.
+        UsageError: The folder cannot be written to.
     """
     run = choice.run.relative_to(folder).as_posix()
     record = {
@@ -87,7 +87,7 @@ def keep_choice(folder: Path, choice: Choice) -> None:
 
 
 def read_choice(folder: Path) -> Choice | None:
-    """What was chosen; None before that.
+    """Return the selected policy; None if none has been selected.
 
     Raises:
         UsageError: The file is damaged.

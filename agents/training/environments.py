@@ -1,4 +1,4 @@
-"""The environments of a run: those it learns in and those that tell how good it is."""
+"""Training and evaluation environments of a run."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from relpos_env.tasks import DEFAULT_WEIGHTS
 from relpos_env.timing import DECISION
 
 CHANGE = (0.25, 0.5)
-"""[-] Shares of the run between which weights of reward terms go to their final values."""
+"""[-] Shares of the run between which the reward weights change to their final values."""
 
 
 def layout_of(config: TrainConfig) -> Layout:
-    """What the policy sees."""
+    """Return the observation layout of the policy."""
     env = config.env
     return Layout(env.observation, env.cars, env.history, env.proximity)
 
@@ -30,13 +30,13 @@ def layout_of(config: TrainConfig) -> Layout:
 def env_arguments(
     config: TrainConfig, scenario: str, level: int | None, done: float = 1.0
 ) -> dict[str, Any]:
-    """Arguments of the environments of one scenario, with as many slots as it has cars.
+    """Return the arguments of the environments of one scenario, with one slot per car.
 
     Args:
-        config: Of the run.
+        config: Configuration of the run.
         scenario: Name or TOML file.
-        level: Of the curriculum; None for what the scenario says.
-        done: Share of the run, on which the weights of reward terms depend.
+        level: Curriculum level; None for the level of the scenario.
+        done: Completed share of the run, which determines the reward weights [-].
     """
     env = config.env
     return {
@@ -53,10 +53,10 @@ def env_arguments(
 
 
 def weights_of(config: TrainConfig, done: float) -> dict[str, float]:
-    """Weights of reward terms by name when such a share of the run is done.
+    """Return the weights of reward terms by name after the share `done` of the run.
 
     Raises:
-        UsageError: One is not TERM=WEIGHT.
+        UsageError: A weight is not TERM=WEIGHT.
     """
     env = config.env
     first, final = _weights("weight", env.weights), _weights("final-weight", env.final_weights)
@@ -70,10 +70,10 @@ def weights_of(config: TrainConfig, done: float) -> dict[str, float]:
 
 
 def _weights(option: str, given: tuple[str, ...]) -> dict[str, float]:
-    """Weights by term.
+    """Return weights by term.
 
     Raises:
-        UsageError: One is not TERM=WEIGHT.
+        UsageError: A text is not TERM=WEIGHT.
     """
     weights = {}
     for text in given:
@@ -86,14 +86,14 @@ def _weights(option: str, given: tuple[str, ...]) -> dict[str, float]:
 
 
 def check_environments(config: TrainConfig) -> tuple[Parts, ...]:
-    """See that all environments of a run can be, at every level; those it learns in.
+    """Validate all environments of a run, at every curriculum level.
 
     Returns:
-        What they are made of, as the scenarios say.
+        Parts of the training environments, at the levels of the scenarios.
 
     Raises:
-        UsageError: More cars than the policy has slots for, or no scenario at all.
-        EnvError: An environment that cannot be.
+        UsageError: An option does not fit the others, for example too few slots for the cars.
+        EnvError: An environment is invalid.
     """
     if config.seed + config.runs - 1 > MOST_SEED:
         raise UsageError(
@@ -128,10 +128,10 @@ def check_environments(config: TrainConfig) -> tuple[Parts, ...]:
 
 
 def choice_environments(config: TrainConfig) -> tuple[Parts, ...]:
-    """Those that tell which policy is kept: learned in, and new to it.
+    """Return the environments of model selection: of training and held-out scenarios.
 
     Raises:
-        EnvError: An environment that cannot be.
+        EnvError: An environment is invalid.
     """
     names = (*config.env.scenarios, *config.choice_scenarios)
     return tuple(_parts(config, name, None) for name in names)
@@ -142,15 +142,15 @@ def _parts(config: TrainConfig, scenario: str, level: int | None) -> Parts:
 
 
 def shares(n: int, scenarios: int) -> list[int]:
-    """So many environments or episodes of each scenario."""
+    """Return the numbers of environments or episodes per scenario; their sum is `n`."""
     counts: list[int] = np.diff(np.linspace(0, n, scenarios + 1).astype(int)).tolist()
     return counts
 
 
 def make_rooms(config: TrainConfig, level: int | None) -> MultiScenarioVecEnv:
-    """The environments to learn in at a level of the curriculum."""
+    """Return the training environments at a curriculum level."""
     scenarios = config.env.scenarios
-    # Handing work to a thread costs as much as stepping a few environments: rather whole rooms.
+    # Dispatching to a thread costs as much as stepping a few environments: one job per scenario.
     whole = len(scenarios) >= config.threads
     parts = [
         FormationVecEnv(

@@ -1,4 +1,4 @@
-"""How good a policy is that is being trained: the same episodes after every leg."""
+"""Evaluation of a policy in training, on the same episodes after every evaluation interval."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from relpos_env.timing import DECISION
 from tracking.arrays import F64, Bool
 
 FIRST_SEED = 500
-"""Episodes of an evaluation have seeds from here on, 500 at most: comparisons begin at 1000."""
+"""First seed of the evaluation episodes, at most 500: comparisons begin at seed 1000."""
 
 
 class Evaluation:
-    """Episodes of all scenarios, driven by what a policy holds for best."""
+    """Episodes of all scenarios, driven by the most likely actions of a policy."""
 
     def __init__(
         self,
@@ -37,14 +37,14 @@ class Evaluation:
         *,
         first_seed: int = FIRST_SEED,
     ) -> None:
-        """Make room for them.
+        """Allocate the environments.
 
         Args:
-            every: What the environments of each scenario are made of.
-            layout: What the policy sees.
-            episodes: How many, shared out among the scenarios.
-            threads: Of the simulation.
-            first_seed: Of the first episode.
+            every: Parts of the environments of each scenario.
+            layout: Observation layout of the policy.
+            episodes: Number of episodes, divided among the scenarios.
+            threads: Threads of the simulation.
+            first_seed: Seed of the first episode.
         """
         self._first_seed = first_seed
         self._rooms = [
@@ -53,12 +53,11 @@ class Evaluation:
         ]
 
     def run(self, policy: SwarmPolicy) -> dict[str, Any]:
-        """Mean reward of a decision, errors from `SETTLE` on [m], and collisions.
+        """Return the mean reward per agent step, errors from `SETTLE` on [m], and collisions.
 
-        Means are over cars and times, so scenarios with more cars count for more. An episode that
-        ends early earns nothing for the rest of its time, and costs nothing: where time is paid
-        for, to be through is better than to hover. The tracking error is None where no car could
-        use any estimate.
+        Means are over cars and times, so scenarios with more cars have more weight. Steps after an
+        early end have zero reward: finishing early is optimal where time has a cost. The tracking
+        error is None if no car had a usable estimate.
         """
         actor = Actor(policy).eval()
         first, drives = self._first_seed, []
@@ -85,29 +84,29 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True)
 class _Drive:
-    """What came of the episodes of one scenario."""
+    """Results of the episodes of one scenario."""
 
     rewards: float
-    """Of all cars and decisions together."""
+    """Sum over all cars and control steps."""
     decisions: float
-    """Of all cars, those after an early end counted."""
+    """Number of agent steps, those after an early end included."""
     collisions: float
     minutes: float
     error: F64
-    """Formation errors from `SETTLE` on, of all cars and times [m]."""
+    """[m] Formation errors from `SETTLE` on, of all cars and times."""
     tracking: F64
-    """Tracking errors likewise, where there are any [m]."""
+    """[m] Finite tracking errors from `SETTLE` on, of all cars and times."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Room:
-    """The episodes of one scenario, side by side."""
+    """Parallel episodes of one scenario."""
 
     formation: EnvCore
     pad: Padding
 
     def drive(self, actor: Actor, first_seed: int) -> _Drive:
-        """From beginning to end."""
+        """Run all episodes to their end."""
         f = self.formation
         for env in range(f.n_envs):
             f.seed(env, seeding.np_random(first_seed + env)[0])
@@ -139,10 +138,10 @@ class _Room:
 
 
 def _scored(alive: Bool) -> Bool:
-    """Which decisions count: from `SETTLE` on, or the last where the task was done before.
+    """Return the control steps that are scored: from `SETTLE` on, or the last of an earlier end.
 
     Args:
-        alive: Which were driven, (decision, env).
+        alive: True until the end of the episode, (step, env).
     """
     scored = alive.copy()
     scored[: round(SETTLE / DECISION)] = False
@@ -152,7 +151,7 @@ def _scored(alive: Bool) -> Bool:
 
 
 def drive(actor: Actor, observations: F32) -> F32:
-    """Actions for observations of any leading axes, (..., 2)."""
+    """Return actions for observations with any leading axes, (..., 2)."""
     with torch.no_grad():
         flat = torch.from_numpy(observations.reshape(-1, observations.shape[-1]))
         actions: F32 = actor(flat).numpy()

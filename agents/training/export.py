@@ -1,4 +1,4 @@
-"""A trained policy as files that run without torch: what `relpos export` does."""
+"""Export of a trained policy to files that do not need torch (`relpos export`)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from agents.training.ppo.network import Actor
 from agents.training.run_folder import BEST, LAST, RunFolder, restore_weights
 
 PACKAGES = ("relpos-env", "torch", "stable-baselines3", "numpy", "numba")
-"""Whose versions a card tells."""
+"""Packages whose versions are recorded in the model card."""
 
 
 def export_policy(
@@ -37,21 +37,21 @@ def export_policy(
     last: bool = False,
     overwrite: bool = False,
 ) -> Path:
-    """Write a policy of a run as a network and a card.
+    """Write a policy of a run as a network and a model card.
 
     Args:
         run: Folder of the run.
         out: Folder to write to.
-        name: Of the policy; by default that of the run's folder.
-        results: What it reached, for the card, as of `relpos compare`.
-        last: That of the last leg of one run instead of what was chosen.
-        overwrite: Replace a policy of that name.
+        name: Name of the policy; by default that of the run's folder.
+        results: Results of the policy for the card, as of `relpos compare`.
+        last: Export the last policy of one run, not the selected one.
+        overwrite: Replace a policy of the same name.
 
     Returns:
         The file with the network.
 
     Raises:
-        UsageError: No run, nothing trained yet, a policy of that name is there already, or the
+        UsageError: There is no run, no checkpoint, or a policy of the same name already, or the
             folder cannot be written to.
     """
     name = name or run.resolve().name
@@ -73,7 +73,7 @@ def export_policy(
     if found is None:
         raise UsageError(f"{run}: nothing trained yet, expected {which}")
     tensors, progress = found
-    # Both files were written after the leg whose weights they hold.
+    # Both files were written after the evaluation of the weights in them.
     measured = progress.log[-1]
     policy = make_policy(config)
     restore_weights(policy, tensors)
@@ -97,14 +97,14 @@ def export_policy(
 
 
 def read_results(path: Path, names: Iterable[str]) -> list[dict[str, Any]]:
-    """What `relpos compare` has measured of a policy: summaries, without single episodes.
+    """Read the summaries of a policy from the results of `relpos compare`, without episodes.
 
     Args:
-        path: Its results.jsonl.
-        names: What the policy may be called there.
+        path: File results.jsonl of the comparison.
+        names: Possible names of the policy in that file.
 
     Raises:
-        UsageError: It cannot be read, a line is no JSON object, or none is about the policy.
+        UsageError: The file cannot be read, a line is no JSON object, or the policy is missing.
     """
     try:
         lines = path.read_text().splitlines()
@@ -131,16 +131,16 @@ def read_results(path: Path, names: Iterable[str]) -> list[dict[str, Any]]:
 
 
 def to_onnx(actor: Actor, size: int) -> bytes:
-    """The network as ONNX: `observations` (batch, size) to `actions` (batch, 2).
+    """Return the network as ONNX: `observations` (batch, size) to `actions` (batch, 2).
 
     Args:
-        actor: To be written.
+        actor: Network to be exported.
         size: Numbers in an observation.
     """
     with warnings.catch_warnings():
-        # The exporter warns of its own future.
+        # The exporter warns of its own deprecations.
         warnings.simplefilter("ignore")
-        # And of packages that are not needed here.
+        # The exporter warns of optional packages, which are not needed.
         logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
         program = torch.onnx.export(
             actor.eval(),
@@ -155,7 +155,7 @@ def to_onnx(actor: Actor, size: int) -> bytes:
     assert program is not None
     model = program.model_proto
     graph = model.graph
-    # The exporter notes of everything where in whose folders it was written.
+    # The exporter records source paths in the metadata of every part.
     for part in (
         model, graph, *graph.node, *graph.input, *graph.output, *graph.value_info,
         *graph.initializer,

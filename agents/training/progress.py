@@ -1,4 +1,4 @@
-"""Where a training run stands: what was measured after every leg."""
+"""Progress of a training run: the record of every evaluation interval."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from dataclasses import dataclass, field
 from typing import Any
 
 COUNTED = ("leg", "frames", "seconds", "return")
-"""What the record of every leg must have to go on from it."""
+"""Numbers that every record needs so that the run can be resumed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """Where a run stands after a leg."""
+    """Progress of a run after an evaluation interval."""
 
     log: list[dict[str, Any]] = field(default_factory=list)
-    """What was measured after every leg."""
+    """Records of all evaluation intervals."""
 
     @classmethod
     def from_json(cls, text: str) -> Progress:
-        """That of a checkpoint.
+        """Return the progress of a checkpoint.
 
         Raises:
-            ValueError: It is damaged.
+            ValueError: The text is damaged.
         """
         found = json.loads(text)
         log = found.get("log") if isinstance(found, dict) else None
@@ -38,38 +38,38 @@ class Progress:
 
     @property
     def legs(self) -> int:
-        """Finished."""
+        """Number of finished evaluation intervals."""
         return len(self.log)
 
     @property
     def frames(self) -> int:
-        """Decisions of cars so far."""
+        """Number of agent steps so far."""
         return int(self.log[-1]["frames"]) if self.log else 0
 
     @property
     def seconds(self) -> float:
-        """Spent on training so far [s]."""
+        """Training time so far [s]."""
         return float(self.log[-1]["seconds"]) if self.log else 0.0
 
     @property
     def best_leg(self) -> int:
-        """The leg after which the weights with the highest return were there, the first of equals.
+        """Index of the evaluation interval with the highest return, the first of equals.
 
         Raises:
-            ValueError: No leg is finished.
+            ValueError: No evaluation interval is finished.
         """
         return max(range(self.legs), key=lambda k: float(self.log[k]["return"]))
 
     def after_leg(
         self, frames: int, seconds: float, level: int | None, measured: Mapping[str, Any]
     ) -> Progress:
-        """Where it stands a leg later.
+        """Return the progress after one more evaluation interval.
 
         Args:
-            frames: So far.
-            seconds: That the leg took [s].
-            level: Of the curriculum in it.
-            measured: Of the policy after it, see `agents.training.evaluation`.
+            frames: Agent steps of the run so far.
+            seconds: Duration of the interval [s].
+            level: Curriculum level of the interval.
+            measured: Evaluation of the policy, see `agents.training.evaluation`.
         """
         spent = round(self.seconds + seconds, 2)
         row = {"leg": self.legs, "frames": frames, "seconds": spent, "level": level}

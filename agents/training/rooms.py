@@ -1,4 +1,4 @@
-"""The environments that a policy is trained in: several scenarios side by side."""
+"""Training environments of several scenarios as one vector environment."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from tracking.arrays import Bool
 
 
 class MultiScenarioVecEnv(SharedAttributeVecEnv):
-    """The seats of several `FormationVecEnv`, one after the other, as of one.
+    """The agent slots of several `FormationVecEnv`, concatenated.
 
-    Environments may have fewer cars than the policy has slots for: what their cars see is padded
-    as if the others were absent, and they take no more seats than they need.
+    Environments may have fewer cars than the policy has slots: their observations are padded as if
+    the other cars were absent, and they have one agent slot per car.
     """
 
     def __init__(
@@ -36,19 +36,19 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
         reward_scale: float = 1.0,
         threads: int = 1,
     ) -> None:
-        """Join them.
+        """Join the environments.
 
         Args:
-            parts: Of one observation mode and action space; all with the truth or none.
-            layout: What the policy sees.
-            reward_scale: Rewards are multiplied by it [-].
-            threads: So many parts are stepped at a time.
+            parts: Environments of one observation mode and action space, all or none with truth.
+            layout: Observation layout of the policy.
+            reward_scale: Factor of the rewards [-].
+            threads: Number of parts that are stepped concurrently.
         """
         self.parts = tuple(parts)
         self._reward_scale = np.float32(reward_scale)
         self._views = [_SeatView(layout, part) for part in self.parts]
         self._pool = ThreadPoolExecutor(threads)
-        # As a rule: those with the most seats, and in larger rooms, which come later.
+        # Usually the slowest first: most agent slots, then later ones, whose rooms are larger.
         sizes = [(part.num_envs, k) for k, part in enumerate(self.parts)]
         self._longest_first = [k for _, k in sorted(sizes, reverse=True)]
         self._rng = np.random.default_rng(0)
@@ -59,9 +59,9 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
         super().__init__(int(ends[-1]), space, parts[0].action_space)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Let the next reset begin the episodes of a seed, each with another time left to go.
+        """Set the seed of the next reset, which also randomises the phases of the episodes.
 
-        Environments so do not end together, wherever training is taken up.
+        Environments then do not end simultaneously, wherever training is resumed.
         """
         if seed is not None:
             self._rng = np.random.default_rng(seed)
@@ -70,12 +70,12 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
         return [seed] * self.num_envs
 
     def reweigh(self, weights: Mapping[str, float]) -> None:
-        """Let reward terms count by these weights from the next step on, others by the task's."""
+        """Set reward weights by term from the next step on; others are those of the task."""
         for part in self.parts:
             part.reweigh(weights)
 
     def reset(self) -> F32:
-        """Begin episodes everywhere; observations, (seat, size)."""
+        """Begin episodes in all environments; return the observations, (slot, size)."""
         seen = [view(part.reset()) for view, part in zip(self._views, self.parts, strict=True)]
         for part in self.parts:
             part.stagger(self._rng)
@@ -83,12 +83,12 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
         return observations
 
     def step_async(self, actions: F32) -> None:
-        """Take the actions of all seats."""
+        """Set the actions of all agent slots."""
         for part, seats in zip(self.parts, self._seats, strict=True):
             part.step_async(actions[seats])
 
     def step_wait(self) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
-        """Drive for one decision."""
+        """Run one control step in all environments."""
         jobs = {k: self._pool.submit(self._step, k) for k in self._longest_first}
         seen, rewards, dones, infos = zip(
             *(jobs[k].result() for k in range(len(self.parts))), strict=True
@@ -97,7 +97,7 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
         return np.concatenate(seen), np.concatenate(rewards), np.concatenate(dones), told
 
     def _step(self, k: int) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
-        """Drive those of part k for one decision."""
+        """Run one control step in part k."""
         view = self._views[k]
         observations, reward, done, infos = self.parts[k].step_wait()
         for info in infos:
@@ -113,14 +113,14 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
 
 
 def observation_space(layout: Layout, *, with_truth: bool) -> Box:
-    """What a seat sees: an observation, and the truth of as many cars behind it if asked for."""
+    """Return the space of one agent slot: an observation, optionally followed by ground truth."""
     space = space_of(layout.fields, layout.history)
     more = np.full(N_TRUTH * layout.n_cars * with_truth, np.inf, np.float32)
     return Box(np.append(space.low, -more), np.append(space.high, more))
 
 
 class _SeatView:
-    """Observations of one part as the policy wants them."""
+    """Observations of one part in the layout of the policy."""
 
     def __init__(self, layout: Layout, part: FormationVecEnv) -> None:
         given = replace(layout, n_cars=part.n_cars)
@@ -128,7 +128,7 @@ class _SeatView:
         self._n_truth = N_TRUTH * layout.n_cars * part.with_truth
 
     def __call__(self, observations: F32) -> F32:
-        """Padded, (..., size)."""
+        """Return padded observations, (..., size)."""
         seen = self._pad(observations[..., : self._size])
         if not self._n_truth:
             return seen

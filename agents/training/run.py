@@ -1,4 +1,4 @@
-"""A run from nothing to a policy that can be used: what `relpos train` does, as a function."""
+"""Training, model selection, export and report of a policy in one call (`relpos train`)."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class PolicyResult:
     """A trained policy."""
 
     policy: Path
-    """The file with its network; the card is next to it."""
+    """File with the network; the model card is in the same folder."""
     best: dict[str, Any]
-    """What was measured of it when it was chosen: seed and leg too."""
+    """Evaluation of the policy in the model selection, with seed and evaluation interval."""
     records: list[dict[str, Any]]
-    """What was measured after every leg, of one run after the other, each with its seed."""
+    """Records of all evaluation intervals, run by run, each with its seed."""
 
 
 def train_policy(
@@ -39,20 +39,20 @@ def train_policy(
     *,
     progress: Callable[[float, dict[str, Any] | None], None] | None = None,
 ) -> PolicyResult:
-    """Train, then write the policy that drives best and a report into the folder of the run.
+    """Train, then write the best policy and a report into the folder of the run.
 
-    Several runs have folders in it, ``seed-0`` and so on, and the calling script must be
-    importable then: its work belongs below `if __name__ == "__main__"`.
+    Parallel runs have subfolders, ``seed-0`` and so on. They require an importable calling script:
+    put its code below `if __name__ == "__main__"`.
 
     Args:
-        config: Of a new run; None to go on with the run in the folder.
-        folder: New or empty, or that of the run.
-        progress: Called with the share done, and after every leg with what was measured, else None.
+        config: Configuration of a new run; None to resume the run in the folder.
+        folder: New or empty folder, or that of the run to resume.
+        progress: Called with the completed share, and with the record of an evaluation interval
+            after it, else None.
 
     Raises:
-        UsageError: The folder does not fit, cannot be written to, or has a name that no policy can
-            have.
-        EnvError: An environment that cannot be.
+        UsageError: The folder is unsuitable or not writable, or its name is no policy name.
+        EnvError: An environment is invalid.
     """
     check_name(folder.resolve().name, "--out")
     resumed = config is None

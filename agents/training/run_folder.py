@@ -1,8 +1,8 @@
-"""The folder of a training run: configuration, checkpoints, best weights, what was measured.
+"""The folder of a training run: configuration, checkpoints, best weights, records.
 
-Weights are stored as safetensors, numbers and their names and nothing that could be executed.
-Every file is written next to its place, flushed, and only then moved there: a full disk or a kill
-leaves the last good one.
+Weights are stored as safetensors, which contain no executable code. Every file is written under a
+temporary name in the same folder, flushed and then renamed: after a kill or with a full disk the
+last good file remains.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class RunFolder:
         self.path = path
 
     def exists(self) -> bool:
-        """Whether a run has begun here."""
+        """Return whether the folder contains a run."""
         return (self.path / CONFIG).exists()
 
     def create(self, config: TrainConfig) -> None:
@@ -45,7 +45,7 @@ class RunFolder:
         Raises:
             UsageError: The folder is not new or empty, or cannot be written to.
         """
-        # A kill in this very moment has left no more than a part of its first file.
+        # A process killed here before has left at most a temporary file of the configuration.
         with suppress(OSError):
             self._beside(CONFIG).unlink()
         check_new(self.path)
@@ -59,10 +59,10 @@ class RunFolder:
             ) from error
 
     def config(self) -> TrainConfig:
-        """The configuration of the run.
+        """Read the configuration of the run.
 
         Raises:
-            UsageError: No run, one of another version, or a damaged one.
+            UsageError: The run is missing, damaged, or of another version.
         """
         path = self.path / CONFIG
         try:
@@ -84,10 +84,10 @@ class RunFolder:
         return config
 
     def save(self, tensors: Mapping[str, Tensor], progress: Progress, *, best: bool) -> None:
-        """Keep a checkpoint, and as the best weights if they are.
+        """Write a checkpoint, and a copy as the best weights if `best`.
 
         Raises:
-            UsageError: It cannot be written; the last good one is still there.
+            UsageError: The checkpoint cannot be written; the last good one remains.
         """
         data = save(dict(tensors), {"progress": json.dumps(asdict(progress))})
         lines = "".join(json.dumps(r, allow_nan=False) + "\n" for r in progress.log)
@@ -98,10 +98,10 @@ class RunFolder:
             self._write(LOG, lines.encode())
 
     def load(self, name: str = LAST) -> tuple[dict[str, Tensor], Progress] | None:
-        """Tensors and progress of a checkpoint; None where there is none yet.
+        """Read tensors and progress of a checkpoint; None if there is none.
 
         Raises:
-            UsageError: It is damaged.
+            UsageError: The checkpoint is damaged.
         """
         path = self.path / name
         if not path.exists():
@@ -118,10 +118,10 @@ class RunFolder:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Say what to do where something of a run that has begun cannot be written.
+        """Convert write errors of a run into errors that name the option to resume it.
 
         Raises:
-            UsageError: Instead of an OSError inside.
+            UsageError: An OSError was raised inside.
         """
         try:
             yield
@@ -134,14 +134,14 @@ class RunFolder:
             ) from error
 
     def _beside(self, name: str) -> Path:
-        """Where a file is written before it is moved in place."""
+        """Return the temporary path of a file."""
         return self.path / f".{name}.new"
 
     def _write(self, name: str, data: bytes) -> None:
-        """Replace a file, or leave it as it is.
+        """Replace a file atomically.
 
         Raises:
-            OSError: It cannot be written.
+            OSError: The file cannot be written; it is unchanged.
         """
         path, scratch = self.path / name, self._beside(name)
         try:
@@ -156,7 +156,7 @@ class RunFolder:
 
 
 def tensors_of(policy: torch.nn.Module, optimizer: torch.optim.Optimizer) -> dict[str, Tensor]:
-    """Weights and the optimiser's memory by name."""
+    """Return copies of the weights and of the optimiser's state by name."""
     tensors = {f"policy.{k}": v for k, v in policy.state_dict().items()}
     for k, memory in optimizer.state_dict()["state"].items():
         tensors.update({f"optimizer.{k}.{name}": value for name, value in memory.items()})
@@ -166,10 +166,10 @@ def tensors_of(policy: torch.nn.Module, optimizer: torch.optim.Optimizer) -> dic
 def restore(
     policy: torch.nn.Module, optimizer: torch.optim.Optimizer, tensors: Mapping[str, Tensor]
 ) -> None:
-    """Put weights and the optimiser's memory back.
+    """Load the weights and the optimiser's state from tensors.
 
     Raises:
-        UsageError: They belong to other networks.
+        UsageError: The tensors belong to other networks or another optimiser.
     """
     restore_weights(policy, tensors)
     memory: dict[int, dict[str, Tensor]] = {}
@@ -185,10 +185,10 @@ def restore(
 
 
 def restore_weights(policy: torch.nn.Module, tensors: Mapping[str, Tensor]) -> None:
-    """Put weights back.
+    """Load the weights from tensors.
 
     Raises:
-        UsageError: They belong to other networks.
+        UsageError: The tensors belong to other networks.
     """
     own = {k.removeprefix("policy."): v for k, v in tensors.items() if k.startswith("policy.")}
     try:

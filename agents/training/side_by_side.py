@@ -1,8 +1,8 @@
-"""Several runs at the same time, each in a process of its own.
+"""Parallel runs, each in its own process.
 
-A run uses one core well and two less so: networks this small are learned 1.4 times as fast by two
-threads. How good a policy gets depends much on the seed. So the cores are better spent on runs of
-different seeds, of which the best is kept.
+Networks of this size train only 1.4 times as fast with two threads, and the result depends
+strongly on the seed. Cores are therefore better used for runs with different seeds, of which the
+best is kept.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from agents.training.train import TrainResult, train
 from relpos_env.errors import EnvError
 
 Progress = Callable[[int, float, dict[str, Any] | None], None]
-"""Called after every leg with the number of the run, its share done and what was measured."""
+"""Callback with the index of the run, its completed share and the record of an interval."""
 
 
 def train_side_by_side(
     configs: Sequence[TrainConfig], folders: Sequence[Path], progress: Progress
 ) -> list[TrainResult]:
-    """Train policies, or go on with their runs.
+    """Train policies, or resume their runs.
 
-    The calling script must be importable: its work belongs below `if __name__ == "__main__"`.
+    The calling script must be importable: put its code below `if __name__ == "__main__"`.
 
     Args:
-        configs: Of the runs; none that has begun already is changed.
-        folders: Of the runs; those with a run in them go on.
+        configs: Configurations of the runs; ignored for runs that are resumed.
+        folders: Folders of the runs; a run in a folder is resumed.
         progress: See `Progress`.
 
     Raises:
-        UsageError: A run failed or was ended from outside; the others are stopped at their last
-            checkpoints.
-        EnvError: An environment that cannot be.
+        UsageError: A run failed or its process was killed; the others are stopped and keep their
+            last checkpoints.
+        EnvError: An environment is invalid.
     """
-    # New processes, since a forked one would share the threads of compiled libraries.
+    # Spawned, because a forked process would share the threads of compiled libraries.
     spawn = multiprocessing.get_context("spawn")
     results: dict[int, TrainResult] = {}
     waiting: dict[Connection, int] = {}
@@ -81,7 +81,7 @@ def train_side_by_side(
 
 
 def _run(connection: Connection, config: TrainConfig, folder: Path) -> None:
-    """One run, in its process: tells every leg, then the result or what went wrong."""
+    """Train one run in its process; send every interval, then the result or the error."""
     follow_parent()
     begun = RunFolder(folder).exists()
     try:
@@ -93,7 +93,7 @@ def _run(connection: Connection, config: TrainConfig, folder: Path) -> None:
     except (UsageError, EnvError) as error:
         connection.send(error)
     except Exception as error:
-        # Whatever else it is may not be one that can be sent; where it began is told here.
+        # Other exceptions may not be picklable; the traceback is printed here.
         traceback.print_exc()
         connection.send(UsageError(f"{folder}: {type(error).__name__}: {error}"))
     else:

@@ -1,9 +1,9 @@
-"""Training of one policy for all cars: what `relpos train` does, as a function.
+"""Training of one policy for all cars (`relpos train`).
 
-A run is made of legs. Each begins with new episodes and reseeded generators, both from the run's
-seed and the leg's number, and ends with an evaluation and a checkpoint. So a run that is taken up
-at a checkpoint goes on exactly as if it had never stopped, and no state of simulations,
-generators or threads has to be stored.
+A run consists of evaluation intervals (`leg` in code and options). Each begins with new episodes
+and generators reseeded from the run's seed and the index of the interval, and ends with an
+evaluation and a checkpoint. A run resumed from a checkpoint is therefore identical to an
+uninterrupted one, and no state of simulations, generators or threads has to be stored.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class TrainResult:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """What was measured after every leg."""
+        """Records of all evaluation intervals."""
         return self.progress.log
 
 
@@ -49,16 +49,16 @@ def train(
     *,
     progress: Callable[[float, dict[str, Any] | None], None] | None = None,
 ) -> TrainResult:
-    """Train a policy, or go on with a run.
+    """Train a policy, or resume a run.
 
     Args:
-        config: Of a new run; None to go on with the run in the folder.
-        folder: New or empty, or that of the run.
-        progress: Called with the share done, and after every leg with what was measured, else None.
+        config: Configuration of a new run; None to resume the run in the folder.
+        folder: New or empty folder, or that of the run to resume.
+        progress: Called with the completed share and the record of an interval after it, else None.
 
     Raises:
-        UsageError: The folder does not fit, or cannot be written to.
-        EnvError: An environment that cannot be.
+        UsageError: The folder is unsuitable or not writable, or the training diverged.
+        EnvError: An environment is invalid.
     """
     run = RunFolder(folder)
     resumed = config is None
@@ -88,7 +88,7 @@ def train(
             try:
                 run_leg(learner.model, config, state.legs, tell)
             except ValueError as error:
-                # torch refuses distributions of what is no number.
+                # torch raises ValueError for distributions with NaN parameters.
                 if all(bool(p.isfinite().all()) for p in learner.model.policy.parameters()):
                     raise
                 raise UsageError(
@@ -129,7 +129,7 @@ class _Learner:
         frames: int,
         before: _Learner | None,
     ) -> _Learner:
-        """Go on in the environments of a level with weights that were learned before."""
+        """Create a learner in the environments of a level, with the weights of a checkpoint."""
         if before is not None:
             before.model.env.close()
         model = make_model(config, make_rooms(config, level))
@@ -143,7 +143,7 @@ class _Learner:
 
 
 def _note(logger: Logger, state: Progress) -> None:
-    """Write what was measured to TensorBoard."""
+    """Write the last record to TensorBoard."""
     row = state.log[-1]
     for name in ("return", "formation_error", "tracking_error", "collisions_per_min"):
         if row[name] is not None:

@@ -1,4 +1,4 @@
-"""Recorded runs, what the tracker makes of them with and without a fault, and how to compare."""
+"""Simulated runs, estimates of the tracker with and without a fault, and their comparison."""
 
 from dataclasses import replace
 from functools import cached_property
@@ -17,24 +17,24 @@ from tracking.measurements import Kind, MeasurementBlock
 from tracking.metrics import bound as bounds
 
 BAD = 1
-"""The car that has the fault."""
+"""Index of the faulty car."""
 BEGIN, END = 30.0, 40.0
-"""[s] When a passing fault is there."""
+"""[s] Times of a temporary fault."""
 SETTLED = 15.0
-"""[s] Errors count from here on: starting is another matter."""
+"""[s] Time from which errors are scored, after the initialisation."""
 SEEDS = range(1, 25)
 PLANE = np.array([1.0, 1.0, 0.0])
 
 
 class Edit:
-    """A recording to spoil: which events belong to whom, and how to change them."""
+    """A recording to be changed: selection and modification of events."""
 
     def __init__(self, block):
         self.block = block
         self.t, self.kind = block.t[0], block.kind[0]
 
     def sent_by(self, *kinds, begin=0.0, end=np.inf):
-        """Events of the bad car: its own, and ranges it takes part in; bool per event."""
+        """Return the mask of the faulty car's own events and ranges, (event,)."""
         who = (self.block.i[0] == BAD) | (self.block.j[0] == BAD)
         return who & np.isin(self.kind, kinds) & (self.t >= begin) & (self.t < end)
 
@@ -48,11 +48,11 @@ class Edit:
         return self.block.take(~rows)
 
     def of_pair(self, other, rows):
-        """Those of the rows that the bad car shares with another."""
+        """Return the rows that are ranges between the faulty car and `other`."""
         return rows & ((self.block.i[0] == other) | (self.block.j[0] == other))
 
     def changed(self, rows, columns, change):
-        """Values of some rows and columns replaced by `change` of them."""
+        """Return the block with values of some rows and columns replaced by `change` of them."""
         values = self.block.values.copy()
         part = np.ix_([0], np.nonzero(rows)[0], columns)
         values[part] = change(values[part][0])
@@ -65,13 +65,13 @@ class Edit:
 
 
 class Run:
-    """Estimates of all recordings next to the truth; pairs with the bad node, and the others."""
+    """Estimates of all recordings and ground truth, for pairs with and without the faulty node."""
 
     def __init__(self, logs, fault):
         self.t = np.arange(SETTLED, 60.0, 0.05)
         constellation = logs[0].constellation
         blocks = MeasurementBlock.stack([fault(Edit(log.block)) for log in logs])
-        # Faults are looked for by pairs that are ok to a metre, as policies are.
+        # Status ok requires an accuracy of 1 m, as for policies.
         tracker = Tracker(constellation, TrackerParams(filter=FOR_POLICIES), n_envs=len(logs))
         self.estimate = tracker.run(blocks, self.t)
         self.touched = (constellation.pairs == BAD).any(axis=1)
@@ -81,7 +81,7 @@ class Run:
         self._check()
 
     def _check(self):
-        """What no fault may change: finite figures, symmetric and positive covariances."""
+        """Assert the invariants: finite estimates, symmetric positive definite covariances."""
         e = self.estimate
         for array in (e.pos_ij_w, e.vel_ij_w, e.cov, e.q_wb, e.nis):
             assert np.isfinite(array).all()
@@ -92,22 +92,22 @@ class Run:
 
     @property
     def runs(self):
-        """Where there is an estimate, (recording, time, pair)."""
+        """Mask of existing estimates, (recording, time, pair)."""
         return self.estimate.status >= Status.AMBIGUOUS
 
     def error(self, begin=SETTLED, end=np.inf):
-        """Root mean square position error of the bad car's pairs over a time, median run [m]."""
+        """Return the RMS position error of the faulty car's pairs in a period, median run [m]."""
         keep = self.runs & self.touched & self._during(begin, end)[:, None]
         off = self._pos - self._truth
         return float(np.median([rms(off[k][keep[k]]) for k in range(len(off))]))
 
     def distance(self):
-        """Root mean square distance of the bad car's pairs, median run [m]."""
+        """Return the RMS distance of the faulty car's pairs, median run [m]."""
         away = self._truth[:, :, self.touched]
         return float(np.median([rms(one) for one in away]))
 
     def shape_error(self, begin=SETTLED, end=np.inf):
-        """The same of the other pairs, after the rotation that fits them best [m]."""
+        """Return the RMS error of the other pairs after the best rotation, median run [m]."""
         rows = self._during(begin, end)
         x, truth = (a[:, rows][:, :, ~self.touched] for a in (self._pos, self._truth))
         R = best_rotation(x, truth, planar=True)
@@ -115,12 +115,12 @@ class Run:
         return float(np.median([rms(one) for one in off]))
 
     def ok_share(self, begin, end):
-        """Share of a time in which the bad car's pairs are ok, median run."""
+        """Return the share of a period in which the faulty car's pairs are ok, median run."""
         ok = self.estimate.ok[:, self._during(begin, end)][..., self.touched]
         return float(np.median(ok.mean(axis=(1, 2))))
 
     def sigma(self, begin, end):
-        """Mean standard deviation of the bad car's positions over a time, median run [m]."""
+        """Return the mean position std of the faulty car's pairs in a period, median run [m]."""
         std = self.estimate.pos_std[:, self._during(begin, end)][:, :, self.touched, :2]
         return float(np.median(std.mean(axis=(1, 2, 3))))
 
@@ -133,7 +133,7 @@ def rms(errors):
 
 
 class Faults:
-    """Recordings, of four cars if nothing is said, their clean runs, and runs with a fault."""
+    """Recordings, by default of four cars, their runs without faults, and runs with a fault."""
 
     def __init__(self, scenario="cars-nlos", cars=4, seeds=SEEDS):
         self.scenario = scenario
@@ -141,23 +141,23 @@ class Faults:
         self.clean = Run(self.logs, lambda edit: edit.block)
 
     def run(self, fault):
-        """All recordings through the tracker, each spoilt by `fault(edit)`."""
+        """Track all recordings, each changed by `fault(edit)`."""
         return Run(self.logs, fault)
 
     def assert_others_as_before(self, run, begin=BEGIN, end=END, allowance=0.0, lost=None):
-        """Pairs without the bad car keep their accuracy: 10 %, and an allowance [m].
+        """Assert that pairs without the faulty car keep their accuracy: 10 % and `allowance` [m].
 
-        Where a fault takes measurements away, `lost(edit)` says which. What these told of the
-        others is not known without them, to no tracker.
+        `lost(edit)` returns the measurements that a fault removes; the limit is scaled by the
+        increase of the bound without them.
         """
         growth = 1.0 if lost is None else self.growth(lost, begin, end)
         allowed = 1.1 * growth * self.clean.shape_error(begin, end) + allowance
         assert run.shape_error(begin, end) < allowed
 
     def growth(self, lost, begin, end):
-        """Bound of the others' shape without some measurements over that with all, median run.
+        """Return the relative increase of the others' shape bound without some measurements.
 
-        Of a silent radio of four cars 1.07 for three seconds and 1.12 for ten.
+        Median run; for a silent radio of four cars 1.07 for three seconds and 1.12 for ten.
         """
 
         def of_the_others(constellation, t, cov, pos, wanted, taken):
@@ -178,18 +178,18 @@ class Faults:
 
     @cached_property
     def silent(self):
-        """Nobody hears the bad car for a while: what its ranges are worth to the others."""
+        """Run without ranges of the faulty car from `BEGIN` to `END`."""
         return self.run(lambda edit: edit.without(edit.ranges()))
 
     def assert_others_as_without(self, run):
-        """Pairs without the bad car keep the accuracy that they have if it is silent: 10 %.
+        """Assert that pairs without the faulty car are within 10 % of their error if it is silent.
 
-        That it is silent costs them 7 to 12 % themselves, of four cars: see `growth`.
+        The silence itself increases their error by 7 to 12 % with four cars, see `growth`.
         """
         assert run.shape_error(BEGIN, END) < 1.1 * self.silent.shape_error(BEGIN, END)
 
     def assert_as_good(self, run, begin=SETTLED, end=np.inf):
-        """Pairs of the bad car keep theirs: a quarter more and a centimetre."""
+        """Assert that pairs of the faulty car keep their accuracy: 25 % and 1 cm."""
         assert run.error(begin, end) < 1.25 * self.clean.error(begin, end) + 0.01
 
 
@@ -200,11 +200,11 @@ def faults():
 
 @pytest.fixture(scope="session")
 def small_faults():
-    """The same with three cars."""
+    """Recordings of three cars."""
     return Faults(cars=3)
 
 
 @pytest.fixture(scope="session")
 def person():
-    """The same of a person with a tracker on every limb."""
+    """Recordings of a person with a tracker on every limb."""
     return Faults("human", cars=None, seeds=range(1, 7))

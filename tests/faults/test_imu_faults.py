@@ -1,7 +1,6 @@
-"""Inertial sensors that stick, spike, saturate or fall silent, and a clock that is off.
+"""Frozen, spiking, saturated or silent inertial sensors, clock offsets and magnetic disturbances.
 
-Every run also checks what no fault may change: figures stay finite, covariances symmetric and
-positive.
+Every run also asserts that estimates are finite, and covariances symmetric and positive definite.
 """
 
 import numpy as np
@@ -15,7 +14,7 @@ BEGIN, END = 30.0, 40.0
 
 
 def each(n, rows):
-    """Every n-th of the rows."""
+    """Return the mask of every n-th row."""
     few = np.zeros_like(rows)
     few[np.nonzero(rows)[0][::n]] = True
     return few
@@ -27,7 +26,7 @@ def wild(values):
 
 @pytest.mark.parametrize("stuck_at", ["the last value", "zero"])
 def test_a_stuck_imu_is_not_believed(faults, stuck_at):
-    """Ten seconds of the same six numbers: as uncertain as without, and good again later."""
+    """Ten seconds of constant samples increase the uncertainty; the accuracy recovers later."""
     held = (lambda v: 0.0 * v) if stuck_at == "zero" else (lambda v: 0.0 * v + v[0])
     run = faults.run(lambda edit: edit.changed(edit.imu(), INERTIAL, held))
     assert run.sigma(BEGIN + 1.0, END) > 1.3 * faults.clean.sigma(BEGIN + 1.0, END)
@@ -38,14 +37,14 @@ def test_a_stuck_imu_is_not_believed(faults, stuck_at):
 
 @pytest.mark.parametrize("columns", [INERTIAL, ACCELEROMETER], ids=["all", "accelerometer"])
 def test_wild_imu_samples_are_left_out(faults, columns):
-    """One sample a second fifty times as large: nobody's accuracy changes."""
+    """One sample per second that is 50 times as large does not change the accuracy of any pair."""
     run = faults.run(lambda edit: edit.changed(each(100, edit.imu()), columns, wild))
     faults.assert_as_good(run, BEGIN, END)
     faults.assert_others_as_before(run)
 
 
 def test_a_saturated_accelerometer_is_doubted(faults):
-    """Accelerations cut at 2 m/s2: all keep their accuracy, the car says that it is less sure."""
+    """Accelerations clipped at 2 m/s2 increase the uncertainty of the car, but not the errors."""
     cut = lambda v: v.clip(-2.0, 2.0)  # noqa: E731
     run = faults.run(lambda edit: edit.changed(edit.imu(), ACCELEROMETER, cut))
     faults.assert_as_good(run, BEGIN, END)
@@ -55,7 +54,7 @@ def test_a_saturated_accelerometer_is_doubted(faults):
 
 
 def test_one_saturated_axis_is_doubted(faults):
-    """The same of the forward axis alone, gravity unharmed: all keep their accuracy."""
+    """Clipping of the forward axis alone does not change the accuracy of any pair."""
     cut = lambda v: v.clip(-2.0, 2.0)  # noqa: E731
     run = faults.run(lambda edit: edit.changed(edit.imu(), ACCELEROMETER[:1], cut))
     faults.assert_as_good(run, BEGIN, END)
@@ -63,7 +62,7 @@ def test_one_saturated_axis_is_doubted(faults):
 
 
 def test_an_accelerometer_saturated_from_the_start_is_the_cars_own_trouble(faults):
-    """A scale that ends at 2 m/s2: the car is less sure and stays; the others are as before."""
+    """With a full scale of 2 m/s2, only the uncertainty of this car increases."""
     cut = lambda v: v.clip(-2.0, 2.0)  # noqa: E731
     run = faults.run(lambda edit: edit.changed(edit.imu(0.0, np.inf), ACCELEROMETER, cut))
     assert run.sigma(15.0, np.inf) > 1.1 * faults.clean.sigma(15.0, np.inf)
@@ -73,7 +72,7 @@ def test_an_accelerometer_saturated_from_the_start_is_the_cars_own_trouble(fault
 
 @pytest.mark.parametrize("limit", [20.0, 12.0])
 def test_a_saturated_accelerometer_on_a_limb_does_not_lose_it(person, limit):
-    """Peaks of every swing cut off: the limb is found within its uncertainty, and stays ok."""
+    """With clipped peaks of every swing, the limb stays ok and its error within 4 sigma."""
     cut = lambda v: v.clip(-limit, limit)  # noqa: E731
     run = person.run(lambda edit: edit.changed(edit.imu(0.0, np.inf), ACCELEROMETER, cut))
     assert run.error() < 1.7 * person.clean.error()
@@ -82,7 +81,7 @@ def test_a_saturated_accelerometer_on_a_limb_does_not_lose_it(person, limit):
 
 
 def test_a_silent_imu_makes_the_car_less_certain(faults):
-    """Ten seconds of ranges alone: the error grows, and the standard deviation with it."""
+    """Ten seconds with ranges only increase the error and the standard deviation."""
     run = faults.run(
         lambda edit: edit.without(edit.sent_by(Kind.IMU, Kind.MAG, begin=BEGIN, end=END))
     )
@@ -93,21 +92,21 @@ def test_a_silent_imu_makes_the_car_less_certain(faults):
 
 
 def test_a_late_imu_costs_little(faults):
-    """A car whose inertial clock is off by 50 ms: as good as before, and so the others."""
+    """An offset of the IMU clock of 50 ms does not change the accuracy of any pair."""
     run = faults.run(lambda edit: edit.later(edit.sent_by(Kind.IMU, Kind.MAG), 0.05))
     faults.assert_as_good(run)
     faults.assert_others_as_before(run, 15.0, np.inf)
 
 
 def test_a_very_late_imu_costs_no_more_than_the_way_it_drives(faults):
-    """Off by 100 ms: worse by what it drives in that time; a centimetre for the others."""
+    """An offset of 100 ms adds at most the distance driven in it; 1 cm for the other pairs."""
     run = faults.run(lambda edit: edit.later(edit.sent_by(Kind.IMU, Kind.MAG), 0.1))
     assert run.error() < faults.clean.error() + 0.1 * 0.5
     faults.assert_others_as_before(run, 15.0, np.inf, allowance=0.01)
 
 
 def test_a_magnet_beside_a_car_turns_nothing(faults):
-    """Five seconds of a field stronger than the earth's: position and heading hold."""
+    """Five seconds of a field stronger than the earth's change neither position nor heading."""
 
     def magnet(edit):
         rows = edit.sent_by(Kind.MAG, begin=BEGIN, end=BEGIN + 5.0)

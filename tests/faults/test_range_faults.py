@@ -1,7 +1,6 @@
-"""Ranges that are missing, late, wrongly calibrated, absurd or made up.
+"""Ranges that are missing, late, wrongly calibrated, frozen, outliers or random.
 
-Every run also checks what no fault may change: figures stay finite, covariances symmetric and
-positive.
+Every run also asserts that estimates are finite, and covariances symmetric and positive definite.
 """
 
 import numpy as np
@@ -14,7 +13,7 @@ RANGE = [0]
 
 
 def test_a_silent_radio_loses_its_pairs_and_no_others(faults):
-    """Three seconds without ranges: not ok after the first, ok again one second after the last."""
+    """Pairs without ranges for 3 s are not ok after 1.2 s, and ok again 1 s after the end."""
 
     def silent(edit):
         return edit.ranges(BEGIN, BEGIN + 3.0)
@@ -28,7 +27,7 @@ def test_a_silent_radio_loses_its_pairs_and_no_others(faults):
 
 
 def test_a_radio_that_is_silent_for_long_leaves_and_comes_back(faults):
-    """Eight seconds: the car is forgotten, joins again, and is as good as before."""
+    """After 8 s without ranges the car has been removed, joins again, and regains its accuracy."""
     run = faults.run(lambda edit: edit.without(edit.ranges(BEGIN, BEGIN + 8.0)))
     assert not run.runs[:, np.abs(run.t - BEGIN - 7.5).argmin()][:, run.touched].any()
     faults.assert_others_as_before(run, BEGIN, BEGIN + 8.0, allowance=0.01)
@@ -36,14 +35,14 @@ def test_a_radio_that_is_silent_for_long_leaves_and_comes_back(faults):
 
 
 def test_late_ranges_cost_little(faults):
-    """A car whose ranges come 50 ms late: as good as before, and so the others."""
+    """Ranges of a car that are 50 ms late do not change the accuracy of any pair."""
     run = faults.run(lambda edit: edit.later(edit.ranges(0.0, np.inf), 0.05))
     faults.assert_as_good(run)
     faults.assert_others_as_before(run, 15.0, np.inf)
 
 
 def test_a_late_clock_costs_little(faults):
-    """A car whose whole clock is off by 50 ms: as good as before, the others but for 5 mm."""
+    """A clock offset of 50 ms of a car does not change its accuracy; 5 mm for the others."""
     kinds = (Kind.IMU, Kind.MAG, Kind.RANGE)
     run = faults.run(lambda edit: edit.later(edit.sent_by(*kinds), 0.05))
     faults.assert_as_good(run)
@@ -51,9 +50,9 @@ def test_a_late_clock_costs_little(faults):
 
 
 def test_a_wrong_slope_costs_no_more_than_itself(faults):
-    """Ranges five per cent too long: pairs of that car are off by no more than that besides.
+    """Ranges that are 5 % too long add at most this error to the pairs of the car.
 
-    Nor are they further off than said, and the others are as good as before.
+    The error stays within 2 sigma, and the others keep their accuracy.
     """
     run = faults.run(lambda edit: edit.changed(edit.ranges(0.0, np.inf), RANGE, lambda v: 1.05 * v))
     assert run.error() < 2.0 * run.sigma(15.0, np.inf)
@@ -62,14 +61,14 @@ def test_a_wrong_slope_costs_no_more_than_itself(faults):
 
 
 def test_a_wrong_offset_costs_no_more_than_itself(faults):
-    """Ranges 0.3 m too long: the pairs of that car are off by less than that."""
+    """Ranges that are 0.3 m too long cause errors of less than 0.3 m."""
     run = faults.run(lambda edit: edit.changed(edit.ranges(0.0, np.inf), RANGE, lambda v: v + 0.3))
     assert run.error() < 0.3
     assert run.shape_error() < 2.0 * faults.clean.shape_error()
 
 
 def test_absurd_ranges_count_for_nothing(faults):
-    """Every tenth range fifty times as long: nothing changes."""
+    """Every tenth range 50 times as long does not change the accuracy of any pair."""
 
     def absurd(edit):
         rows = np.zeros(edit.t.shape, dtype=bool)
@@ -82,7 +81,7 @@ def test_absurd_ranges_count_for_nothing(faults):
 
 
 def test_a_car_that_makes_its_ranges_up_is_not_believed(faults):
-    """Ten seconds of random ranges: its pairs are not ok, the others lose what they told them."""
+    """With random ranges for 10 s, pairs of the car are not ok, others as without its ranges."""
     rng = np.random.default_rng(9)
     made_up = lambda v: rng.uniform(0.5, 5.0, v.shape)  # noqa: E731
     run = faults.run(lambda edit: edit.changed(edit.ranges(), RANGE, made_up))
@@ -95,10 +94,10 @@ def test_a_car_that_makes_its_ranges_up_is_not_believed(faults):
 
 @pytest.mark.parametrize("offset", [1.0, 0.5, 0.3, -1.0])
 def test_a_wrong_calibration_is_noticed(faults, offset):
-    """Ten seconds of ranges that err alike: its pairs are not ok, and no further off than said.
+    """With a range offset for 10 s, pairs of the car are not ok and within 2.5 sigma.
 
-    0.3 m takes longer to be told from what ranges err by themselves. The others are as good as
-    before but for what those ranges had told them.
+    The detection of 0.3 m takes longer, since it is closer to ordinary range errors. The others
+    keep their accuracy.
     """
     run = faults.run(lambda edit: edit.changed(edit.ranges(), RANGE, lambda v: v + offset))
     noticed = 3.0 if offset == 0.3 else 1.0
@@ -113,9 +112,9 @@ def test_a_wrong_calibration_is_noticed(faults, offset):
 
 @pytest.mark.parametrize("offset", [1.0, -1.0])
 def test_a_wrong_calibration_is_noticed_among_three(small_faults, offset):
-    """The same with two ranges to tell it from: not ok, no further off than said.
+    """With a range offset in a group of three, pairs of the car are not ok and within 4 sigma.
 
-    What the two others have left is one range, which the third no longer checks.
+    The other two cars have one range left, without redundancy.
     """
     run = small_faults.run(lambda edit: edit.changed(edit.ranges(), RANGE, lambda v: v + offset))
     assert run.ok_share(BEGIN + 1.0, END) < 0.05
@@ -126,7 +125,7 @@ def test_a_wrong_calibration_is_noticed_among_three(small_faults, offset):
 
 
 def test_a_wrong_calibration_from_the_start_is_never_ok(faults):
-    """All ranges of a car a metre too long: its pairs are not ok, the others as before."""
+    """If all ranges of a car are 1 m too long, its pairs are not ok; the others are unaffected."""
     run = faults.run(lambda edit: edit.changed(edit.ranges(0.0, np.inf), RANGE, lambda v: v + 1.0))
     assert run.ok_share(15.0, np.inf) < 0.1
     assert run.error() < 0.5
@@ -134,7 +133,7 @@ def test_a_wrong_calibration_from_the_start_is_never_ok(faults):
 
 
 def test_ranges_that_stick_are_not_heard(faults):
-    """Ten seconds of each pair's last range: as if the radio were silent, and good again later."""
+    """Frozen ranges of all pairs of a car for 10 s have the effect of a silent radio."""
 
     def stuck(edit):
         for other in (0, 2, 3):
@@ -150,7 +149,7 @@ def test_ranges_that_stick_are_not_heard(faults):
 
 
 def test_one_range_that_sticks_is_lost_alone(faults):
-    """Ten seconds of one pair's last range: that pair is not ok, all others as before."""
+    """With one pair's range frozen for 10 s, this pair is not ok; all others are unaffected."""
 
     def stuck(edit):
         return edit.changed(edit.of_pair(0, edit.ranges()), RANGE, lambda v: 0.0 * v + v[0])
@@ -165,7 +164,7 @@ def test_one_range_that_sticks_is_lost_alone(faults):
 
 
 def test_rounded_ranges_are_not_taken_for_stuck(faults):
-    """Ranges rounded to a decimetre, many of them equal in a row: as good as before, and ok."""
+    """Ranges rounded to 0.1 m, often equal in sequence, stay ok and keep the accuracy."""
     run = faults.run(
         lambda edit: edit.changed(edit.ranges(0.0, np.inf), RANGE, lambda v: v.round(1))
     )

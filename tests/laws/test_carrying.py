@@ -1,4 +1,4 @@
-"""The covariance is carried now and then: ranges in between say the same of an older state."""
+"""Periodic covariance propagation: ranges in between are applied to the state of the last epoch."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from tracking.vehicles import VEHICLES
 
 
 def test_carrying_late_is_carrying_at_once(make_group):
-    """But for the noise of a twentieth of a second, and what comes of it later."""
+    """Estimates agree except for the process noise of 0.05 s and its later effects."""
     group = make_group(n=4, seconds=12.0, hz=100.0)
     t_out = np.arange(4.0, 12.0, 0.03)
     carriers = {name: replace(c, propagation_period=1e-6) for name, c in VEHICLES.items()}

@@ -1,4 +1,4 @@
-"""Laws of finding the place of a node from its distances to others."""
+"""Properties of multilateration: the position of a node from distances to others."""
 
 from functools import cache
 
@@ -27,7 +27,7 @@ def coefficients(d):
 
 
 def layout(seed, d, n=5):
-    """Places of n others that span the space, and a node among them, (other, 3) and (3) [m]."""
+    """Return positions of n others that span the space and of a node, and the distances [m]."""
     rng = np.random.default_rng(seed)
     known, pos = np.zeros((n, 3)), np.zeros(3)
     while True:
@@ -52,7 +52,7 @@ def test_exact_distances_lead_to_the_place_from_anywhere(seed, d):
 @given(seed=st.integers(0, 2**32 - 1), d=st.sampled_from([2, 3]), k=st.integers(0, 4))
 @settings(max_examples=60)
 def test_a_place_is_never_replaced_by_one_that_fits_worse(seed, d, k):
-    """One distance is what an obstacle made of it, and the search begins at the truth."""
+    """One distance has an NLOS error, and the search begins at the truth."""
     known, pos, distance = layout(seed, d)
     distance[k] += 0.5
     found = pos.copy()
@@ -82,7 +82,7 @@ def test_short_distances_say_more_than_long_ones(d):
 
 
 def test_others_in_line_leave_both_sides():
-    """The place that is found is on one side or the other, and fits all distances."""
+    """The solution is on either side of the line and fits all distances."""
     known = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.5, 0.0, 0.0]])
     pos = np.array([0.3, 1.2, 0.0])
     distance = np.linalg.norm(known - pos, axis=1)
@@ -99,7 +99,7 @@ def test_others_in_line_leave_both_sides():
 )
 @settings(max_examples=150)
 def test_others_close_together_leave_two_sides_and_one_is_right(seed, d, more, wide):
-    """As many others as the space has dimensions, or more, however close to each other."""
+    """The number of others is that of the dimensions or more; they may be close together."""
     rng = np.random.default_rng(seed)
     known, pos, sides = np.zeros((d + more, 3)), np.zeros(3), np.zeros((2, 3))
     extent = 0.0

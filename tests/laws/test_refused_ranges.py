@@ -1,4 +1,4 @@
-"""Ranges that are all refused tell nothing, whatever arrives."""
+"""Rejected ranges carry no information, even if they continue to arrive."""
 
 from dataclasses import replace
 

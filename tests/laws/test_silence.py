@@ -1,4 +1,4 @@
-"""What was heard long ago does not count: silences of all, first ranges, doubts."""
+"""Old measurements expire: silence of all nodes, first ranges, status doubtful."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from tracking.measurements import Kind
 
 
 def ranges_of(block, *nodes):
-    """Ranges between two of the nodes, or all of one, (event)."""
+    """Return the mask of ranges between two nodes, or of all ranges of one, (event,)."""
     found = block.kind[0] == Kind.RANGE
     for node in nodes:
         found &= (block.i[0] == node) | (block.j[0] == node)
@@ -20,7 +20,7 @@ def ranges_of(block, *nodes):
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_after_a_common_silence_the_group_begins_anew(name, make_group):
-    """Whoever speaks first has been away as long as the others."""
+    """The first transmitter after the silence has been silent as long as the others."""
     group = make_group(n=4, seconds=40.0)
     b = group.block
     silent = ranges_of(b) & (b.t[0] > 8.0) & (b.t[0] < 16.0)
@@ -38,7 +38,7 @@ def test_after_a_common_silence_the_group_begins_anew(name, make_group):
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_first_ranges_of_long_ago_place_nobody(name, make_group):
-    """A newcomer's distance to one of three is four seconds old when it ranges the others."""
+    """The first range of a joining node is four seconds old when it ranges the other two."""
     if name.startswith("paper"):
         pytest.skip("the paper names no age of the first k measurements")
     group = make_group(n=4, seconds=12.0)
@@ -52,7 +52,7 @@ def test_first_ranges_of_long_ago_place_nobody(name, make_group):
 
 
 def test_a_doubt_ends_where_a_single_other_is_left(make_group):
-    """Ranges with one other say nothing of a common offset, neither for nor against."""
+    """Ranges to a single node carry no information about a common offset."""
     group = make_group(n=4, seconds=30.0)
     b = group.block
     values = b.values.copy()
@@ -68,7 +68,7 @@ def test_a_doubt_ends_where_a_single_other_is_left(make_group):
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_who_was_heard_and_never_started_is_absent_again(name, make_group):
-    """Two of three range a few times: too few to start, and then nobody speaks."""
+    """Two of three nodes range a few times, too few for a start; then all are silent."""
     group = make_group(n=3, seconds=20.0)
     b = group.block
     few = ranges_of(b, 0, 1) & (b.t[0] < 0.2)

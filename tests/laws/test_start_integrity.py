@@ -1,4 +1,4 @@
-"""From exact data, no numbering of the nodes leads to an estimate that is OK and wrong."""
+"""With exact data, no numbering of the nodes leads to an estimate that is OK and wrong."""
 
 from dataclasses import replace
 from itertools import permutations
@@ -26,12 +26,12 @@ def track(group, block=None, filter="joint"):
 
 
 def check_numberings(groups):
-    """None is OK and wrong; two that are OK agree within their covariance, at all times."""
+    """Assert that no pair is OK and wrong, and that pairs that are OK agree within 3 sigma."""
     first = {}
     for numbering, group in groups:
         estimate = track(group)
         assert not wrong_while_ok(estimate, group.pairs(T)).any(), numbering
-        # By the nodes' names, so that pairs of two numberings can be compared.
+        # Keyed by the original nodes, so that pairs of two numberings can be compared.
         for p, (i, j) in enumerate(group.constellation.pairs):
             a, b = numbering[i], numbering[j]
             sign = 1.0 if a < b else -1.0
@@ -67,7 +67,7 @@ def test_no_numbering_is_ok_and_wrong_in_space(vehicle, at_rest, hz):
 
 
 def with_absurd(group, add, count, seed):
-    """Some of the ranges that a pair starts with are absurd."""
+    """Return the block with outliers among the first ranges of a pair."""
     block, rng = group.block, np.random.default_rng(seed)
     i, j = group.constellation.pairs[rng.integers(group.constellation.n_pairs)]
     of_pair = (block.kind[0] == Kind.RANGE) & (block.i[0] == i) & (block.j[0] == j)
@@ -83,7 +83,7 @@ def with_absurd(group, add, count, seed):
 @pytest.mark.parametrize("vehicle", ["robot", "car", "human"])
 def test_absurd_first_ranges_make_nothing_ok_and_wrong_and_delay_little(vehicle, count, add):
     for seed in range(4):
-        # Cars that are in motion from the start need 12 s to find their rotation.
+        # The rotation of cars that start in motion is determined after 12 s.
         group, t = (
             ExactGroup(vehicle, (0, 1, 2, 3), hz=50.0, seconds=16.0),
             np.arange(0.2, 15.5, 0.05),

@@ -1,8 +1,8 @@
-"""Symmetries of the filters, at all times of a run and as exact as arithmetic allows.
+"""Symmetries of the filters, at all times of a run and up to rounding errors.
 
-Sums that are taken in another order differ by rounding: positions by less than `ROUNDING`. Until
-accelerations show how a group is turned, one of many turns is reported: laws of turned worlds hold
-for pairs that are OK.
+A different order of summation changes positions by less than `ROUNDING`. Until accelerations
+determine the rotation of a group, one of many hypotheses is reported: properties of rotated worlds
+are tested for pairs that are OK.
 """
 
 from dataclasses import fields, replace
@@ -21,14 +21,14 @@ from tracking.filters.paper import PaperParams
 from tracking.measurements import Kind, MeasurementBlock
 
 ROUNDING = 1e-6
-"""[m]"""
+"""[m] Limit of differences by rounding."""
 SECONDS, HZ = 10.0, 64.0
 T = np.arange(2, int(SECONDS * 8)) / 8.0
-"""Times of estimates; like those of measurements they are whole 1 / 2**20 s, exact in any clock."""
+"""[s] Times of estimates: multiples of 2**-20 s, as of measurements; exact in any clock."""
 
 
 def exact(vehicle, n, dimensions=2, noise=0.0, at_rest=False):
-    """A group in smooth motion, its constellation and measurements, and places at the start."""
+    """Return constellation, measurements and first positions of a group in smooth motion."""
     order = tuple(range(n))
     group = ExactGroup(
         vehicle, order, hz=HZ, at_rest=at_rest, dimensions=dimensions, seconds=SECONDS
@@ -71,9 +71,9 @@ def case(group):
 
 
 def make_tracker(name, constellation, first, n_envs=1):
-    """The filter of the paper has a first layout, and not the norm of the velocity.
+    """Return a tracker; the filter of the paper gets a first layout and speed "rate".
 
-    With it any rounding grows a thousandfold in two seconds.
+    With the norm of the velocity as speed, rounding errors grow 1000-fold in two seconds.
     """
     layout = tuple(tuple(map(float, p)) for p in first)
     paper = PaperParams(
@@ -99,7 +99,7 @@ def assert_identical(a, b):
 
 
 def renumber(constellation, block, first, new):
-    """Node k becomes new[k]; events of one instant stay in the order in which they came."""
+    """Renumber node k as new[k]; simultaneous events keep their order."""
     old = np.argsort(new)
     nodes = tuple(constellation.nodes[k] for k in old)
     other = replace(constellation, nodes=nodes)
@@ -115,27 +115,27 @@ def renumber(constellation, block, first, new):
 
 
 def in_old_numbers(found, constellation, new):
-    """Positions and status of the pairs of a renumbered group, as they were numbered before."""
+    """Return positions and status of a renumbered group by the original pairs."""
     i, j = new[constellation.pairs].T
     p, sign = found.constellation.pair_index[i, j], np.where(i < j, 1.0, -1.0)
     return sign[:, None] * found.pos_ij_w[:, p], found.status[:, p]
 
 
 def states(name, constellation, block):
-    """The block with orientations in place of inertial samples, as the filter gets them."""
+    """Return the block with orientations instead of inertial samples, the input of filters."""
     follows_bias = filter_builder(name)(constellation, FilterParams(), 1).follows_bias
     return Orientation(constellation, OrientationParams(), follows_bias=follows_bias).step(block)
 
 
 def turn(block, angle):
-    """All orientations and accelerations turned about z, the ranges as they were."""
+    """Return the block with orientations and accelerations rotated about z, and the rotation."""
     c, s = (0.0, 1.0) if angle == np.pi / 2 else (np.cos(angle), np.sin(angle))
     half_c, half_s = np.cos(0.5 * angle), np.sin(0.5 * angle)
     v, values = block.values, block.values.copy()
     for a, b in ((0, 3), (1, 2)):
         values[..., a] = half_c * v[..., a] - half_s * v[..., b]
         values[..., b] = half_c * v[..., b] + half_s * v[..., a]
-    for a in (4, 9):  # acceleration, and by how much it was turned upright
+    for a in (4, 9):  # acceleration, accumulated tilt correction
         values[..., a], values[..., a + 1] = (
             c * v[..., a] - s * v[..., a + 1],
             s * v[..., a] + c * v[..., a + 1],
@@ -146,9 +146,9 @@ def turn(block, angle):
 
 
 def mirror(constellation, block):
-    """Left and right exchanged in the world and on every body."""
+    """Return constellation and block reflected in y, in the world and in every body frame."""
     values, rows = block.values.copy(), block.kind == Kind.STATE
-    for k in (1, 3, 5, 9, 11, 13):  # of turns those about x and z, of vectors what is along y
+    for k in (1, 3, 5, 9, 11, 13):  # x, z of rotations and y of vectors
         values[rows, k] = -values[rows, k]
     antennas = tuple(
         replace(a, offset_b=(a.offset_b[0], -a.offset_b[1], a.offset_b[2]))
@@ -158,7 +158,7 @@ def mirror(constellation, block):
 
 
 def assert_near(pos, status, other, atol, always):
-    """At all times; or, unless `always`, where the pair is OK in both estimates."""
+    """Assert equal positions at all times, or only where both are OK unless `always`."""
     off = np.linalg.norm(pos - other.pos_ij_w, axis=-1)
     counts = always | ((status == Status.OK) & (other.status == Status.OK))
     assert np.where(counts, off, 0.0).max() <= atol
@@ -168,13 +168,13 @@ def assert_near(pos, status, other, atol, always):
 
 # --- numbering ---------------------------------------------------------------------------------
 NUMBERING = {
-    # Wheels correct one after the other, each at what those before it have left.
+    # Wheel constraints are applied in sequence, each to the result of the previous one.
     ("ekf-mds", "three cars"): (0.4, False),
     ("ekf-mds", "simulated cars"): (0.05, False),
-    # Unstable: the noise of ranges is small against that of their rates.
+    # Unstable: the noise of ranges is small compared with that of their rates.
     ("paper-ekf-mds", "four drones in space"): (1e-5, True),
 }
-"""Filter and group to tolerance [m], and whether it holds before pairs are OK."""
+"""Filter and group to tolerance [m], and True if it applies before pairs are OK."""
 
 
 @on_all_groups
@@ -191,7 +191,7 @@ def test_numbering_nodes_otherwise_changes_nothing(name, group):
 
 # --- turned and mirrored worlds -----------------------------------------------------------------
 def in_another_world(name, group, world):
-    """Positions and status of a group in a turned or mirrored world, as in the first world."""
+    """Return positions and status in a rotated or reflected world, mapped to the first world."""
     constellation, block, first = case(group)
     block = states(name, constellation, block)
     if world == "mirrored":
@@ -249,7 +249,7 @@ def test_worlds_that_turn_the_bank_onto_itself_turn_all_that_joint_has_ok(group,
 @on_all_filters
 @pytest.mark.parametrize("clock", [1e5, 2.0**17])
 def test_a_clock_that_began_elsewhere_changes_not_one_bit(name, group, clock):
-    """Where the sum of time and clock is exact."""
+    """The sums of times and clock are exact in floating point."""
     constellation, block, first = case(group)
     found = estimate(name, constellation, replace(block, t=block.t + clock), first, clock)
     assert_identical(found, as_it_is(name, group))
@@ -267,7 +267,7 @@ def test_a_clock_that_rounds_times_changes_rounding_only(name, group):
 @on_all_groups
 @on_all_filters
 def test_splits_at_any_event_change_not_one_bit(name, group):
-    """Also between events of one instant."""
+    """Cuts may be between simultaneous events."""
     constellation, block, first = case(group)
     rng, tracker = np.random.default_rng(3), make_tracker(name, constellation, first)
     cuts = np.sort(rng.integers(0, block.n_events, 30))

@@ -1,4 +1,4 @@
-"""Larger groups: corrections that wait are the same corrections."""
+"""Larger groups: deferred rank-1 updates are equivalent to immediate ones."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tracking.tracker import TrackerParams
 
 @pytest.fixture(scope="module")
 def crowd(make_group):
-    """Six nodes whose ranges come fifteen at a time, one of them too long for a while."""
+    """Six nodes with 15 ranges per message, of which one is too long from 6 to 8 s."""
     group = make_group(n=6, seconds=12.0)
     block = group.block
     hidden = (block.kind == Kind.RANGE) & (block.i == 0) & (block.j == 1)
@@ -26,7 +26,7 @@ def crowd(make_group):
 
 @pytest.fixture
 def at_once(monkeypatch):
-    """Call it, and corrections wait no longer."""
+    """Return a function that disables the deferral of updates."""
 
     def no_room() -> None:
         for module in (state, smoothing):
@@ -37,7 +37,7 @@ def at_once(monkeypatch):
 
 def test_waiting_changes_nothing_but_rounding(crowd, at_once):
     t_out = np.arange(1.0, 12.0, 0.13)
-    # Learned from exact ranges, their noise is so small that rounding weighs more.
+    # Range noise learned from exact ranges would be so small that rounding errors dominate.
     joint = JointParams(noise_learning=NoiseLearningParams(learns=False))
     params = TrackerParams(filter=FilterParams(joint=joint))
     waited = Tracker(crowd.constellation, params).run(crowd.block, t_out)

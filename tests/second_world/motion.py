@@ -1,4 +1,4 @@
-"""How cars of the second world drive: wanted speeds and curves, on kinematic bicycles."""
+"""Motion of cars in the second world: random target speeds and curvatures, kinematic bicycles."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 HZ = 200.0
-"""[Hz] Of the integration."""
+"""[Hz] Rate of the integration."""
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Where a tracker is and which way its car points, at any time."""
+    """Position of a tracker and yaw of its car as functions of time."""
 
     place: CubicSpline
-    """[m] Over (x, y)."""
+    """[m] Position (x, y)."""
     yaw: CubicSpline
-    """[rad]"""
+    """[rad] Yaw."""
 
     def turns(self, t):
-        """Return body to world, (time)."""
+        """Return the rotations from body to world, (time,)."""
         return Rotation.from_euler("Z", self.yaw(t)[:, None])
 
     def rates(self, t):
@@ -31,7 +31,7 @@ class Motion:
 
 
 def drive(world, rng) -> list[Motion]:
-    """Drive every car of a world for its seconds and half of one more."""
+    """Simulate the motion of every car of a world, 0.5 s longer than the run."""
     t = np.arange(int((world.seconds + 0.5) * HZ)) / HZ
     n = len(world.vehicles)
     top = np.array([v.top_speed for v in world.vehicles])
@@ -49,7 +49,7 @@ def drive(world, rng) -> list[Motion]:
             stands = rng.random() < 0.12
             wanted[i] = 0.0 if stands else rng.uniform(0.25, 1.0) * top[i]
             wanted_bend[i] = rng.uniform(-1.0, 1.0) * sharpest[i]
-        # Cars that are far out turn back.
+        # Cars outside the radius turn back.
         away = np.linalg.norm(at, axis=1)
         home = np.arctan2(-at[:, 1], -at[:, 0]) - yaw
         home = np.arctan2(np.sin(home), np.cos(home))

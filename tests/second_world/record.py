@@ -1,4 +1,4 @@
-"""A run of the second world as a log, and what a filter would believe that knew it."""
+"""A run of the second world as a log, and the parameters of a filter that match the world."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ TRUTH_HZ = 25.0
 
 
 def record(world: World, *, vehicle: str | None = None, is_known: bool = False) -> Log:
-    """Move and read everything.
+    """Simulate a run and return its log.
 
     Args:
-        world: What to run.
-        vehicle: What the nodes are said to be; None for what they are.
-        is_known: Whether the log says where the trackers sit.
+        world: World of the run.
+        vehicle: Vehicle of the nodes in the log; None for the true one.
+        is_known: True if the log contains the mounts of the trackers.
     """
     rng = np.random.default_rng([world.seed, 2])
     motions = drive(world, rng) if world.kind == "car" else fly(world, rng)
@@ -80,7 +80,7 @@ def record(world: World, *, vehicle: str | None = None, is_known: bool = False) 
 
 
 def matched(world: World) -> JointParams:
-    """What is true in this world, in the terms of the joint filter: for the bound."""
+    """Return the parameters of the joint filter that match the world, for the bound."""
     imu, radio, field = world.imu, world.radio, world.field
     ways = 2.0 * np.mean([0.5 * v.top_speed for v in world.vehicles])
     noise = float(np.hypot(imu.acc_noise, 0.6 * imu.vibration) / np.sqrt(imu.hz))

@@ -1,4 +1,4 @@
-"""What the sensors of the second world read."""
+"""Sensors of the second world."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ G = 9.81
 
 
 def read_imu(world, vehicle, motion, t, rng):
-    """Angular rate, specific force and magnetic field in the IMU's axes, (time, 9)."""
+    """Return angular rate, specific force and magnetic field in the IMU's axes, (time, 9)."""
     imu, field = world.imu, world.field
     mount = Rotation.from_euler("ZYX", vehicle.tilt[::-1])
     sensor = motion.turns(t) * mount
@@ -29,12 +29,12 @@ def read_imu(world, vehicle, motion, t, rng):
 
 
 def in_space(vectors):
-    """Return vectors with a third axis, 0 where they have none."""
+    """Return vectors padded with zeros to three axes, (time, 3)."""
     return np.column_stack([vectors, np.zeros((len(vectors), 3 - vectors.shape[1]))])
 
 
 def steel(world, place):
-    """What the building adds to the field, (time, 3) [uT]: the same for every car."""
+    """Return the magnetic disturbance of the building, common to all cars, (time, 3) [uT]."""
     rng = np.random.default_rng([world.seed, 1])
     total = np.zeros((len(place), 3))
     for _ in range(6):
@@ -46,7 +46,7 @@ def steel(world, place):
 
 
 def read_ranges(world, motions, rng):
-    """Ranges of all pairs: times, ends, metres and which ones are long, in order of time."""
+    """Return ranges of all pairs in order of time: time [s], i, j, range [m], 1 if NLOS."""
     radio, n = world.radio, len(world.vehicles)
     pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
     rows = []

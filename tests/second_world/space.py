@@ -1,4 +1,4 @@
-"""How hands, drones and bodies of the second world move in space."""
+"""Motion of hands, drones and bodies in the second world."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ SITES = np.array(
     [[0, 0, 1.0], [0.1, 0, 1.6], [0.1, 0.35, 1.0], [0.1, -0.35, 1.0], [0, 0.12, 0.5],
      [0, -0.12, 0.5]]
 )  # fmt: skip
-"""[m] Waist, head, wrists and knees of a body that stands."""
+"""[m] Waist, head, wrists and knees of an upright body."""
 REACH = np.array([0.02, 0.08, 0.35, 0.35, 0.2, 0.2])
-"""[m] How far a site swings."""
+"""[m] Amplitude of the swing of a site."""
 BETWEEN = {"hand": (0.5, 1.6), "drone": (1.0, 3.0), "human": (1.0, 3.0)}
-"""[s] From one place of a path to the next."""
+"""[s] Range of the time between two waypoints of a path."""
 
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """Where a tracker is and how it is turned, at any time."""
+    """Position and orientation of a tracker as functions of time."""
 
     place: CubicSpline
-    """[m] Over (x, y, z)."""
+    """[m] Position (x, y, z)."""
     turn: RotationSpline
 
     def turns(self, t):
-        """Return body to world, (time)."""
+        """Return the rotations from body to world, (time,)."""
         return self.turn(t)
 
     def rates(self, t):
@@ -38,14 +38,14 @@ class Flight:
 
 
 def fly(world, rng) -> list[Flight]:
-    """Move every node of a world for its seconds and a second more."""
+    """Simulate the motion of every node of a world, one second longer than the run."""
     if world.kind == "human":
         return _body(world, rng)
     return [_one(world, vehicle, rng) for vehicle in world.vehicles]
 
 
 def _knots(world, rng):
-    """Return times of places, close together at rest, and how many of them are at rest [s]."""
+    """Return times of waypoints [s], dense at rest, and the number of waypoints at rest."""
     t = list(np.arange(-1.0, world.at_rest + 0.1, 0.1))
     n_rest = len(t)
     while t[-1] < world.seconds + 1.5:
@@ -54,7 +54,7 @@ def _knots(world, rng):
 
 
 def _path(world, vehicle, rng, knots, n_rest):
-    """Return places that are no farther apart than the vehicle gets, (knot, 3) [m]."""
+    """Return waypoints within the top speed of the vehicle, (knot, 3) [m]."""
     ceiling = np.array([world.radius, world.radius, 2.5])
     floor = np.array([-world.radius, -world.radius, 0.3])
     at = rng.uniform(0.6 * floor, 0.6 * ceiling)
@@ -87,14 +87,14 @@ def _one(world, vehicle, rng):
 
 
 def _yaw(rng, knots, n_rest, step):
-    """Return yaws of a random walk that begins after the rest, (knot) [rad]."""
+    """Return yaws of a random walk that begins after the time at rest, (knot,) [rad]."""
     steps = rng.normal(0.0, step, len(knots))
     steps[:n_rest] = 0.0
     return rng.uniform(-np.pi, np.pi) + np.cumsum(steps)
 
 
 def _body(world, rng):
-    """Return six sites of one body that walks about and swings its limbs."""
+    """Return the motions of six sites of a body that walks and swings its limbs."""
     knots, n_rest = _knots(world, rng)
     path = CubicSpline(knots, _path(world, world.vehicles[0], rng, knots, n_rest) * [1.0, 1.0, 0.0])
     heading = CubicSpline(knots, _yaw(rng, knots, n_rest, 0.5))

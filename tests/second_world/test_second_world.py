@@ -1,4 +1,4 @@
-"""The second world keeps the laws of its own sensors, and has nothing of the simulator's."""
+"""The second world is independent of the simulator, and its sensors obey their models."""
 
 import subprocess
 import sys

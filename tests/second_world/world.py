@@ -1,4 +1,4 @@
-"""What a run of the second world is: everything drawn at random before anything moves."""
+"""Parameters of a run of the second world, all drawn at random before the simulation."""
 
 from __future__ import annotations
 
@@ -9,55 +9,55 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
-    """A car on a kinematic bicycle: its rear axle does not slide, whatever it does."""
+    """A car as a kinematic bicycle: its rear axle never slides."""
 
     wheelbase: float
-    """[m]"""
+    """[m] Wheelbase."""
     ahead: float
     """[m] Tracker ahead of the rear axle."""
     aside: float
-    """[m] Tracker left of the middle of the car."""
+    """[m] Tracker left of the centre line of the car."""
     top_speed: float
-    """[m/s]"""
+    """[m/s] Top speed."""
     acceleration: float
-    """[m/s2] Along and across."""
+    """[m/s2] Largest longitudinal and lateral acceleration."""
     tilt: tuple[float, float, float]
     """[rad] Mounting error of the IMU: roll, pitch, yaw."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Imu:
-    """A cheap or a good one."""
+    """Standard deviations of the errors of an IMU, per axis."""
 
     hz: float
     gyr_noise: float
-    """[rad/s] Of a sample."""
+    """[rad/s] Noise of a gyroscope sample."""
     gyr_bias: float
-    """[rad/s]"""
+    """[rad/s] Gyroscope bias."""
     acc_noise: float
-    """[m/s2] Of a sample."""
+    """[m/s2] Noise of an accelerometer sample."""
     acc_bias: float
-    """[m/s2]"""
+    """[m/s2] Accelerometer bias."""
     vibration: float
-    """[m/s2] Of a sample, at top speed."""
+    """[m/s2] Vibration in an accelerometer sample, at top speed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Field:
-    """The magnetic field, and what the magnetometer adds."""
+    """The magnetic field, and the errors of the magnetometer."""
 
     level: float
-    """[uT] Horizontal part, towards y."""
+    """[uT] Horizontal component, towards y."""
     down: float
-    """[uT]"""
+    """[uT] Vertical component."""
     bend: float
-    """[uT] Standard deviation of an axis that steel adds, which changes with the place."""
+    """[uT] Standard deviation of the position-dependent disturbance by steel, per axis."""
     length: float
-    """[m] Wavelength of that."""
+    """[m] Wavelength of the disturbance by steel."""
     iron: float
-    """[uT] What is left of the car's own after calibration."""
+    """[uT] Residual hard-iron error of the car after calibration, per axis."""
     noise: float
-    """[uT]"""
+    """[uT] Noise of a magnetometer sample, per axis."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,21 +65,21 @@ class Radio:
     """Ranges: white, slow and heavy-tailed errors."""
 
     hz: float
-    """Of every pair."""
+    """[Hz] Range rate of every pair."""
     white: float
-    """[m]"""
+    """[m] Standard deviation of the white error."""
     slow: float
-    """[m]"""
+    """[m] Standard deviation of the slow error."""
     slow_time: float
-    """[s] How long a slow error lasts, in motion or at rest."""
+    """[s] Correlation time of the slow error, in motion or at rest."""
     long_share: float
-    """[-] Share of the time at which ranges of a pair are long."""
+    """[-] Share of the time in which ranges of a pair are NLOS."""
     long_time: float
-    """[s] For so long at a time."""
+    """[s] Mean duration of NLOS."""
     long_excess: tuple[float, float]
-    """[m]"""
+    """[m] Limits of the NLOS bias."""
     loss: float
-    """[-]"""
+    """[-] Share of lost ranges."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,11 +93,11 @@ class World:
     field: Field
     radio: Radio
     radius: float
-    """[m] Cars turn back from there."""
+    """[m] Distance from the origin at which cars turn back."""
     at_rest: float
-    """[s] Nothing moves before."""
+    """[s] Time at rest at the start."""
     kind: str = "car"
-    """Or `hand`, `drone`, `human`: three to six in space, a body with six nodes."""
+    """Vehicle of the nodes: `car` (3 to 5), `hand` or `drone` (4 to 6), `human` (6 on one body)."""
 
 
 def draw(
@@ -106,10 +106,10 @@ def draw(
     """Draw a world.
 
     Args:
-        seed: Same seed and kind, same world.
-        kind: What carries the nodes.
+        seed: Seed of the world.
+        kind: Vehicle of the nodes.
         seconds: Length of the run [s].
-        long_share: Share of long ranges; drawn as well where None.
+        long_share: Share of NLOS ranges [-]; None to draw it.
     """
     rng = np.random.default_rng([seed, 0])
 

@@ -1,4 +1,4 @@
-"""The bound, the smoother, and the metrics of consistency and of joins."""
+"""The bound, the smoother, and the metrics of consistency and GOSPA."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def drive():
 
 
 def test_bound_is_what_the_filter_expects_of_itself(drive):
-    """With the parameters of the world, the filter's own covariance is near the bound."""
+    """With the parameters of the world, the covariance of the filter is close to the bound."""
     params = matched_params(recordable("cars-los"))
     bound = posterior_bound(drive, params)
     tracker = Tracker(drive.constellation, TrackerParams(filter=FilterParams(joint=params)))
@@ -79,7 +79,7 @@ def test_smoothing_leaves_the_tracker_where_it_was(drive):
 
 
 def test_smoothing_with_nothing_later_is_the_estimate(drive):
-    """At the moment of a range: in between, smoothing lets the wheels speak once more."""
+    """Tested at the time of a range; between ranges, smoothing applies wheel constraints again."""
     heard = (drive.block.kind[0] == Kind.RANGE) & (drive.block.t[0] < 20.0)
     moment = float(drive.block.t[0, heard][-1])
     tracker, estimate, later = run_until(drive, moment)
@@ -98,7 +98,7 @@ def test_smoothing_knows_more(drive):
 
 @pytest.mark.parametrize("ahead", [0.0, 0.02, 0.05, 0.1])
 def test_a_group_that_starts_among_what_is_later_is_not_estimated_yet(drive, ahead):
-    """Of cars that drive already: all rotations would be followed from then on."""
+    """With moving cars: smoothing would propagate all rotations from then on."""
     moving = drive.block.take(drive.block.t[0] > 15.0)
     tracker = Tracker(drive.constellation)
     edges, status = np.arange(15.0, 17.0, 0.01), None
@@ -120,7 +120,7 @@ def test_only_joint_looks_back(drive):
 @settings(max_examples=8)
 @given(seed=st.integers(0, 2**31))
 def test_late_doubled_and_shuffled_measurements_change_nothing(drive, seed):
-    """Whatever arrives within the delay, in any order and however often."""
+    """Measurements may arrive within the delay in any order and repeatedly."""
     rng = np.random.default_rng(seed)
     block = drive.block.take(slice(0, 3000))
     arrival = block.t[0] + rng.uniform(0.0, 0.08, block.n_events)
@@ -195,8 +195,8 @@ FAR = 100.0 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.2], [0.1, -1.0]])
 
 
 def far_nodes():
-    """A node that stands at the origin, if only it knew, among four that are so far off that all
-    is linear; accelerations are white noise, ranges have white noise and nothing else."""
+    """Return a linear Gaussian run: a node at rest at the origin, at an unknown position, and four
+    distant nodes; accelerations and ranges have only white noise."""
     nodes = [NodeConfig(id=k, kind="static") for k in range(4)]
     group = Constellation(
         nodes=(*nodes, NodeConfig(id=4, vehicle="drone", imu_hz=HZ)), dimensions=2
@@ -231,7 +231,7 @@ def far_nodes():
 
 
 def kalman_runs(params, t, n_runs, seed):
-    """Errors of a textbook Kalman filter in simulated runs, (run, time, node, 2)."""
+    """Return errors of a textbook Kalman filter in simulated runs, (run, time, node, 2) [m]."""
     rng, dt = np.random.default_rng(seed), 1.0 / HZ
     F = np.eye(12)
     F[8:10, 10:12] = dt * np.eye(2)
@@ -250,7 +250,7 @@ def kalman_runs(params, t, n_runs, seed):
     P, found = P0, np.zeros((n_runs, len(t), 5, 2))
     for k in range(len(t)):
         if k > 0:
-            # The error of a filter that knows F grows by the noise that it does not know.
+            # The error is propagated by F and increased by the process noise.
             error = error @ F.T + rng.standard_normal((n_runs, 12)) @ root.T
             P = F @ P @ F.T + Q
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + SIGMA**2 * np.eye(4))
@@ -262,7 +262,7 @@ def kalman_runs(params, t, n_runs, seed):
 
 
 def test_the_bound_of_a_linear_gaussian_run_is_what_a_kalman_filter_errs_by():
-    """In all three alignments, over 400 simulated runs."""
+    """Tested for all three alignments, over 400 simulated runs."""
     log, params, t = far_nodes()
     bound = posterior_bound(log, params, skip=SKIP)
     at = np.round((bound.t - t[0]) * HZ).astype(int)

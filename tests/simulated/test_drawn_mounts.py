@@ -1,4 +1,4 @@
-"""Trackers that sit elsewhere on simulated cars: sensors and truth are of where they are."""
+"""Trackers with random mounts on simulated cars: sensors and truth refer to the mount."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ STILL = replace(
 
 @pytest.fixture(scope="module")
 def runs():
-    """The same drive with trackers in the middle of the cars, and elsewhere."""
+    """The same drive with trackers at the centres of the cars, and with random mounts."""
     scenario = recordable("cars-los")
     car = replace(scenario.car, roll_compliance=0.0, pitch_compliance=0.0)
     scenario = replace(scenario, imu=STILL, car=car)
@@ -36,7 +36,7 @@ def pose(log, node):
 
 
 def offset(runs, node):
-    """Of the tracker in the frame of its car, (time, 2) [m]."""
+    """Return the offset of the tracker in the body frame of its car, (time, 2) [m]."""
     _, middle, yaw = pose(runs[0], node)
     _, moved, _ = pose(runs[1], node)
     way, c, s = moved - middle, np.cos(yaw), np.sin(yaw)
@@ -54,7 +54,7 @@ def test_a_tracker_stays_where_it_was_drawn(runs, node):
 
 @pytest.mark.parametrize("node", range(3))
 def test_its_accelerometer_feels_the_way_round_the_middle(runs, node):
-    """Rigid body: what it feels more is ``w x (w x r) + w' x r``."""
+    """The additional acceleration of a rigid body at r is ``w x (w x r) + w' x r``."""
     ahead, aside = offset(runs, node)[0]
     read = []
     for log in runs:
@@ -67,7 +67,7 @@ def test_its_accelerometer_feels_the_way_round_the_middle(runs, node):
     expected = np.stack(
         [-(rate**2) * ahead - spin_up * aside, spin_up * ahead - rate**2 * aside], axis=-1
     )
-    # A yaw rate that is rounded to 0.001 rad/s says an acceleration of the yaw to 0.1 rad/s2.
+    # A yaw rate rounded to 0.001 rad/s determines its derivative to 0.1 rad/s2.
     assert np.abs(more - expected).max() < 0.03
     assert np.abs(expected).max() > 0.3
     np.testing.assert_array_equal(moved[:, :3], middle[:, :3])

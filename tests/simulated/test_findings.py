@@ -1,4 +1,4 @@
-"""Wrong units, axes, clocks and calibrations are found; right ones are not."""
+"""Wrong units, axes, clocks and calibrations are detected, without false positives."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def with_samples(log, kind, change):
 
 
 def scaled(*factors):
-    """Columns of an IMU sample times factors."""
+    """Return a function that multiplies the first columns of samples by factors."""
     return lambda values: values * np.r_[factors, np.ones(values.shape[1] - len(factors))]
 
 
@@ -99,7 +99,7 @@ def test_a_gyroscope_that_reads_a_rotation_at_rest_is_a_warning(drive):
 
 
 def test_a_steady_turn_is_no_bias_that_is_taken_off(drive):
-    """A car on a circle seems to rest all the time."""
+    """The IMU of a car on a circle appears to be at rest all the time."""
     t = drive.block.t[0][(drive.block.kind[0] == Kind.IMU) & (drive.block.i[0] == 0)]
     turning = np.random.default_rng(1).normal(0.0, 0.01, (len(t), 3)) + [0.0, 0.0, 0.15]
 
@@ -124,7 +124,7 @@ def test_two_clocks_that_are_late_are_both_corrected(drive):
 
 
 def of_first(change, kind=Kind.IMU):
-    """A change of the first car's samples of a kind, as `wrong` takes it."""
+    """Return a function that changes the samples of one kind of the first car in a log."""
 
     def apply(log):
         block = log.block
@@ -174,7 +174,7 @@ def test_the_clock_of_a_single_node_is_corrected(drive):
 
 
 def test_of_a_group_that_is_lost_nothing_is_said():
-    """In a hall of steel a quarter of the ranges is too long by more than half a metre."""
+    """In a steel hall, a quarter of the ranges is too long by more than 0.5 m."""
     log = simulate(scenario="warehouse", seconds=60.0, seed=20)
     assert {f.severity for f in examine(log)[1]} <= {"note"}
 
@@ -192,7 +192,7 @@ def test_axes_of_a_magnetometer_are_named_where_bodies_turn_about_all(order):
     assert find_gyroscope(log) == []
     found = find_gyroscope(with_samples(log, Kind.MAG, turn))
     assert len(found) >= 4
-    # Its own axes, seen from those that it is read with.
+    # Expected text: the axes of the sensor in terms of the recorded ones.
     back = np.argsort(order)
     named = ", ".join(("-" if sign[k] < 0.0 else "") + "mag_" + "xyz"[k] for k in back)
     assert all(f"were {named}, or all three" in f.text for f in found)
@@ -271,7 +271,7 @@ def test_progress_of_checks_goes_up():
 
 
 def test_ranges_that_the_filter_refuses_are_named(drive):
-    """Ranges with errors of metres lose the group; ordinary ones do not."""
+    """Ranges with errors of several metres cause a finding; ordinary ones do not."""
     rng = np.random.default_rng(3)
 
     def scatter(values):

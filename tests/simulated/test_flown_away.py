@@ -1,4 +1,4 @@
-"""A node whose estimate left the group by dead reckoning is brought back by what it ranges."""
+"""A node whose estimate diverged by dead reckoning is recovered from its ranges."""
 
 import runpy
 from dataclasses import replace
@@ -13,11 +13,11 @@ from tracking.measurements import Kind
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 AWAY = 30.0
-"""[m] How far off, with 5 m/s of speed, and as certain as before."""
+"""[m] Position error of the first diverged node, with 5 m/s and unchanged covariance."""
 
 
 def send_away(tracker, nodes):
-    """Put nodes elsewhere, in every hypothesis."""
+    """Shift position and velocity of nodes in every hypothesis."""
     saved = tracker.save()
     state = saved["filter"]
     for k, node in enumerate(nodes):
@@ -28,7 +28,7 @@ def send_away(tracker, nodes):
 
 
 def errors_after(group, block, truth, gone, at, t):
-    """Errors of distances, (time, pair) [m], and the estimate, with nodes sent away at a time."""
+    """Return distance errors, (time, pair) [m], and the estimate, after a divergence at `at`."""
     tracker = Tracker(group)
     tracker.step(block.take(block.t[0] <= at), at)
     send_away(tracker, gone)
@@ -39,7 +39,7 @@ def errors_after(group, block, truth, gone, at, t):
 
 @pytest.fixture(scope="module")
 def space():
-    """What `benchmarks/space_runs.py` defines."""
+    """Names defined by `benchmarks/space_runs.py`."""
     return runpy.run_path(str(BENCHMARKS / "space_runs.py"))
 
 
@@ -83,7 +83,7 @@ def test_a_hand_that_went_away_from_fixed_nodes_comes_back(space):
 
 @pytest.mark.parametrize(("node", "rounds", "beyond"), [(0, 1, 20.0), (1, 2, 8.0), (2, 3, -2.5)])
 def test_a_few_absurd_rounds_of_a_drone_send_it_nowhere(swarm, node, rounds, beyond):
-    """All of its ranges are wrong alike for a moment; it stays where it is, and is there."""
+    """All ranges of a drone have the same error for up to 3 rounds; its estimate is unaffected."""
     block, t = swarm.block, np.arange(30.1, 33.0, 0.1)
     i, j = swarm.constellation.pairs.T
     values = block.values.copy()

@@ -1,4 +1,4 @@
-"""Headings and rotations of simulated cars before they drive."""
+"""Headings and rotations of simulated cars at rest and after the first motion."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from tracking.geometry import best_rotation
 
 
 def test_standing_does_not_tell_how_a_group_is_turned():
-    """Six cars, eight metres apart, joined one by one, two seconds of ranges: then they drive."""
+    """Six cars, eight metres apart, join in sequence and drive after two seconds of ranges."""
     log = simulate(scenario="open", seconds=5.0, seed=1)
     tracker = Tracker(log.constellation)
     t = log.block.t[0]
@@ -31,7 +31,7 @@ def test_standing_does_not_tell_how_a_group_is_turned():
 
 
 def test_headings_are_uncertain_until_cars_have_driven():
-    """Magnetometers are wrong by degrees where they stand, and nothing changes that at rest."""
+    """Magnetometers have errors of degrees, constant at rest, that depend on the position."""
     log = simulate(scenario="cars-los", seconds=20.0, seed=3)
     joint = matched_params(recordable("cars-los"))
     car = joint.vehicles["car"]

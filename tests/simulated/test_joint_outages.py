@@ -1,4 +1,4 @@
-"""Groups whose tracker begins, or hears nothing for a while, as they drive."""
+"""Trackers that start, or receive nothing for some time, while the group drives."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,14 @@ DRIVES = range(200, 216)
 
 @pytest.fixture(scope="module")
 def drives():
-    """Logs of three cars, and the same with orientations in place of samples."""
+    """Logs of three cars, and blocks with orientations instead of inertial samples."""
     logs = [simulate(scenario="cars-los", seconds=END, seed=seed) for seed in DRIVES]
     stages = [Orientation(log.constellation, OrientationParams()) for log in logs]
     return logs, [stage.step(log.block) for stage, log in zip(stages, logs, strict=True)]
 
 
 def followed(logs, blocks, t):
-    """Estimates of all drives, and their errors in the plane, (drive, time, pair) [m]."""
+    """Return estimates of all drives and horizontal errors, (drive, time, pair) [m]."""
     group = logs[0].constellation
     found = Tracker(group, n_envs=len(logs)).run(MeasurementBlock.stack(blocks), t)
     truth = np.stack([log.truth.pairs(group, t)[0] for log in logs])
@@ -31,7 +31,7 @@ def followed(logs, blocks, t):
 
 
 def test_a_tracker_that_begins_in_mid_drive_is_not_sure_of_a_wrong_rotation(drives):
-    """Wheels speak against the right one as well while velocities are not known yet."""
+    """Wheel constraints contradict the true rotation too, until velocities are known."""
     logs, blocks = drives
     t = np.arange(BEGIN, END - 1.0, 0.1)
     found, error = followed(logs, [b.take(b.t[0] > BEGIN) for b in blocks], t)
@@ -41,7 +41,7 @@ def test_a_tracker_that_begins_in_mid_drive_is_not_sure_of_a_wrong_rotation(driv
 
 
 def test_after_a_silence_the_filter_knows_that_it_knows_less(drives):
-    """The first samples after it say nothing about what happened in it."""
+    """The first samples after a gap carry no information about the motion during the gap."""
     logs, blocks = drives
     gap, group = 0.5, logs[0].constellation
     cut = [b.take((b.t[0] <= BEGIN) | (b.t[0] > BEGIN + gap)) for b in blocks]
@@ -63,14 +63,14 @@ def test_after_a_silence_the_filter_knows_that_it_knows_less(drives):
 
 
 def wrong_and_ok(logs, cut, since):
-    """In how many drives some pair is ok and off by a metre for over half a second."""
+    """Return the number of drives with a pair ok and wrong by > 1 m for > 0.5 s in total."""
     found, error = followed(logs, cut, np.arange(since, END - 0.5, 0.1))
     wrong = ((found.status == Status.OK) & (error > 1.0)).any(axis=-1)
     return (wrong.sum(axis=1) > 5).sum(), found, error
 
 
 def test_a_group_that_heard_nothing_for_seconds_begins_anew(drives):
-    """Its cars went their own ways: a filter that goes on comes out mirrored or turned."""
+    """The cars moved apart: a filter without reset would end up reflected or rotated."""
     logs, blocks = drives
     back = BEGIN + 2.0
     cut = [b.take((b.t[0] <= BEGIN) | (b.t[0] > back)) for b in blocks]
@@ -82,7 +82,7 @@ def test_a_group_that_heard_nothing_for_seconds_begins_anew(drives):
 
 
 def test_a_car_that_was_not_heard_for_seconds_joins_anew(drives):
-    """The others go on as they are, and it is soon among them again."""
+    """The others are not affected, and the car joins again within 2 s."""
     logs, blocks = drives
     back = BEGIN + 3.0
     cut = []
@@ -107,7 +107,7 @@ def test_ranges_alone_that_are_missed_are_bridged_by_inertia(drives):
 
 
 def test_those_who_come_back_begin_anew_without_those_who_do_not(make_group):
-    """Two of five stay silent: they are not waited for."""
+    """Two of five nodes stay silent: the start does not wait for them."""
     group = make_group(n=5, seconds=13.0)
     b = group.block
     ranges = b.kind[0] == Kind.RANGE
@@ -123,7 +123,7 @@ def test_those_who_come_back_begin_anew_without_those_who_do_not(make_group):
 
 @pytest.mark.parametrize("n", [2, 3])
 def test_who_stands_is_where_it_was(make_group, n):
-    """A group at rest knows its distances, not how it is turned: a gap in the ranges costs none."""
+    """At rest, distances are known and the rotation is not: a gap in the ranges removes no node."""
 
     class Standing(make_group):
         def pos(self, t):

@@ -1,4 +1,4 @@
-"""What the ranges of a recording err by, found against its truth, and the bound that follows."""
+"""Range errors of a recording, estimated from its ground truth, and the resulting bound."""
 
 from dataclasses import replace
 
@@ -27,14 +27,14 @@ def drive():
 
 
 def ways(log, t):
-    """How far each node has come, from the truth at the times of its ranges alone."""
+    """Return the distance travelled by each node, from positions at the times of ranges [m]."""
     pos, _ = log.truth.positions(log.constellation, t)
     steps = np.linalg.norm(np.diff(pos, axis=0), axis=2)
     return np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
 
 
 def with_errors(log, white, parts, wild, seed):
-    """The same drive, ranges exact but for white noise, parts (std, length), and some too long."""
+    """Return the log with simulated range errors: white, correlated (std, length), outliers."""
     rng, table = np.random.default_rng(seed), range_table(log.block, log.constellation, log.truth)
     error, way = white * rng.standard_normal(len(table.t)), ways(log, table.t)
     for a, b in log.constellation.pairs:
@@ -64,7 +64,7 @@ def test_noise_and_what_stays_are_told_apart(drive, white, fast, slow, wild):
     expected = np.sqrt(white**2 + sum(std**2 for std, _ in parts))
     assert found.white_std == pytest.approx(white, rel=0.25)
     assert np.sqrt(variance) == pytest.approx(expected, rel=0.25)
-    # Half of what a part comes to, on the way that it says.
+    # The variograms agree at the correlation lengths of the parts.
     for way in (fast[1], slow[1] if slow else 1.0):
         model = white**2 + sum(s**2 * (1.0 - np.exp(-way / at)) for s, at in parts)
         gamma = found.white_std**2 + sum(
@@ -93,7 +93,7 @@ def test_labelled_ranges_do_not_count(drive):
 
 
 def test_the_bound_of_a_recording_is_near_that_of_its_world(drive):
-    """But for the noise, which it measures, and the rotation, which cars at rest do not know."""
+    """The noise is measured, and the rotation unknown, since the cars start at rest."""
     params = matched_params(recordable("cars-los"))
     world = posterior_bound(drive, params, turn_std=UNKNOWN_TURN[2])
     found = recorded_bound(drive, params)
@@ -125,7 +125,7 @@ def test_it_says_why_it_cannot_be_told(drive):
 
 
 def test_nothing_is_ok_while_a_tenth_of_the_ranges_does_not_fit():
-    """In a hall of steel a quarter of the ranges is too long by more than half a metre."""
+    """In a steel hall, a quarter of the ranges is too long by more than 0.5 m."""
     log = simulate(scenario="warehouse", seconds=60.0, seed=22)
     strict = track_log(log, findings=()).score
     lenient = JointParams(supervision=SupervisionParams(surprise_limit=1e9))

@@ -1,4 +1,4 @@
-"""Hands next to fixed nodes, and drones, in space, from nothing but raw sensors."""
+"""Tracking in space from raw sensors: hands next to fixed nodes, and drones."""
 
 import runpy
 import sys
@@ -18,7 +18,7 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 @pytest.fixture(scope="module")
 def measured():
-    """The script that measures them, and the runs it is made of."""
+    """Names of the benchmark script, with its simulated runs."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "path", [str(BENCHMARKS), *sys.path])
         return runpy.run_path(str(BENCHMARKS / "measure_space.py"))
@@ -26,7 +26,7 @@ def measured():
 
 @pytest.mark.parametrize("seed", [9, 11, 12, 13])
 def test_a_hand_is_followed_among_fixed_nodes(measured, seed):
-    """Of seed 9, newcomers on wrong sides were once believed, against surveyed distances."""
+    """Seed 9 tests that surveyed distances reject joining nodes on the wrong side."""
     judged = measured["judge"](measured["hand"](seed), seed)
     assert judged.settled_shape < 0.4
     assert judged.ok > 0.5
@@ -42,7 +42,7 @@ def test_a_swarm_of_drones_keeps_together(measured, seed):
 
 
 def test_the_tilt_of_a_drone_that_was_in_flight_at_the_start_does_not_swing():
-    """The bias of its gyroscope is told by the tilt no faster than that is corrected."""
+    """The gyro bias must not adapt to the tilt faster than the tilt is corrected."""
     space = runpy.run_path(str(BENCHMARKS / "space_runs.py"))
     rng, t = np.random.default_rng(4), np.arange(0.0, 60.0, 0.01)
     nodes = (NodeConfig(id=1, vehicle="drone", initial_heading=0.0), NodeConfig(id=2))
@@ -63,7 +63,7 @@ def test_the_tilt_of_a_drone_that_was_in_flight_at_the_start_does_not_swing():
 
 
 def test_surveyed_distances_settle_on_which_side_fixed_nodes_are(measured):
-    """Eight of them, in the order in which they join: one layout is left before anybody ranges."""
+    """Eight fixed nodes join in sequence; one layout remains before the first range."""
     run = measured["hand"](9)
     tracker, t = Tracker(run.constellation), run.block.t[0]
     tracker.step(run.block.take(slice(0, int(np.searchsorted(t, 2.0)))), 2.0)

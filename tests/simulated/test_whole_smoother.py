@@ -1,4 +1,4 @@
-"""Smoothing of a whole recording: both passes are filters, and together they know more."""
+"""Smoothing of a whole recording: combination of a forward and a backward filter."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def test_it_is_nearer_to_the_truth_than_the_filter(scenario):
 
 
 def test_the_start_is_known_with_hindsight():
-    """While a filter does not know how a group is turned, the pass backwards has found it."""
+    """The backward pass has resolved the rotation where the forward filter has not yet."""
     log = simulate(scenario="cars-los", seconds=40.0, seed=61)
     t = np.arange(1.0, 39.0, 0.1)
     truth, _ = log.truth.pairs(log.constellation, t)
@@ -71,7 +71,7 @@ def test_who_joins_leaves_and_surveys_come_first():
 
 @pytest.mark.parametrize("vehicle", ["car", "robot", "human"])
 def test_an_exact_run_is_followed_backwards_as_well(vehicle):
-    """Motion constraints and dead reckoning hold with the sign of time changed."""
+    """Motion constraints and dead reckoning are valid with reversed time."""
     group = ExactGroup(vehicle, range(4), hz=50.0, seconds=24.0, at_rest=True)
     t = np.arange(1.0, 23.5, 0.1)
     whole = smooth_whole(group.constellation, group.block, t).estimate
@@ -94,7 +94,7 @@ def test_a_log_is_smoothed_by_track_log():
 
 def test_a_pair_that_one_pass_knows_has_what_that_one_knows():
     log = simulate(scenario="cars-los", seconds=20.0, seed=3)
-    # Nothing is known of the future at the end of a recording, nor of the past at its beginning.
+    # There are no later measurements at the end of a recording, nor earlier ones at its start.
     t = np.array([10.0, log.block.t[0, -1]])
     plain = Tracker(log.constellation).run(log.block, t).take(0)
     whole = smooth_whole(log.constellation, log.block, t).estimate

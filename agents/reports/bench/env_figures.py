@@ -1,4 +1,4 @@
-"""The picture of `relpos bench env`."""
+"""The figure of `relpos bench env`."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 ENV_PICTURE = "env_cost.svg"
 LONG = 5.0
-"""[-] Times that differ by more are drawn on a logarithmic scale."""
+"""[-] Times that span more than this factor are drawn on a logarithmic axis."""
 
 
 @in_style
 def env_figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    """Time of an env-step over environments, over cars, and of its parts.
+    """Draw the time of an env-step over environments, over cars, and of its parts.
 
     Args:
-        rows: Of `agents.bench.env.bench_env`.
+        rows: Records of `agents.bench.env.bench_env`.
     """
     curves = [r for r in rows if r["what"].startswith("growth")]
     first = curves[0]["what"]
@@ -48,7 +48,7 @@ def _curve(axes: Axes, rows: Sequence[dict[str, Any]], key: str, label: str) -> 
 
 
 def _bars(axes: Axes, rows: Sequence[dict[str, Any]]) -> None:
-    """Parts of the first batch."""
+    """Draw the time of the parts of the first batch."""
     what = next(r["what"] for r in rows if "solver_share" in r)
     parts = [r for r in rows if r["what"].startswith(f"{what}: ")]
     names = [r["what"].removeprefix(f"{what}: ") for r in parts]

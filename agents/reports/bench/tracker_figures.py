@@ -1,4 +1,4 @@
-"""The picture of `relpos bench tracker`."""
+"""The figure of `relpos bench tracker`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PICTURE = "tracker_cost.svg"
 
 @in_style
 def cost_figure(result: Growth) -> Figure:
-    """Time of a message over the size of the group, ours and the peers'."""
+    """Draw the time per message over the number of nodes, of this tracker and of peers."""
     figure = new_figure(10, 3.8)
     left, right = figure.subplots(1, 2)
     left.plot(result.n, result.ours, "o-", color="C0", label="joint")

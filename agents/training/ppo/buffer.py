@@ -1,4 +1,4 @@
-"""Experience of all seats, of which only that of cars in the room is learned from."""
+"""Rollout buffer of all agent slots; only slots of present cars are trained on."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from stable_baselines3.common.type_aliases import RolloutBufferSamples
 
 
 class SwarmRolloutBuffer(RolloutBuffer):  # type: ignore[misc]
-    """A rollout buffer that leaves the seats of absent cars out; these see nothing but zeros."""
+    """A rollout buffer that omits slots of absent cars, whose observations are all zeros."""
 
     generator_ready: bool
 
     def compute_returns_and_advantage(
         self, last_values: torch.Tensor, dones: np.ndarray[tuple[int], np.dtype[np.bool_]]
     ) -> None:
-        """Generalised advantages; what comes after a car has gone says nothing about its action.
+        """Compute generalised advantages without bootstrapping from observations of absent cars.
 
-        The value of an absent car's zeros is not learned, so nothing may rest on it: the step
-        after which a car is gone, for a while or for good, has no advantage, and no other looks
-        beyond it.
+        The value of an absent car's zeros is not trained. The last step before a car is absent,
+        temporarily or finally, therefore has zero advantage, and earlier advantages are summed up
+        to that step only.
 
         Args:
-            last_values: Of the observations after the last step, (seat, 1).
-            dones: Whether episodes ended with it, (seat).
+            last_values: Values of the observations after the last step, (slot, 1).
+            dones: True where the episode ended with the last step, (slot,).
         """
         after = last_values.clone().cpu().numpy().flatten()
         goes_on = 1.0 - dones.astype(np.float32)
@@ -43,10 +43,10 @@ class SwarmRolloutBuffer(RolloutBuffer):  # type: ignore[misc]
         self.returns = self.advantages + self.values
 
     def get(self, batch_size: int | None = None) -> Generator[RolloutBufferSamples, None, None]:
-        """Random batches of one size, all there is at most once; a smaller rest is left out.
+        """Yield random batches of equal size, each transition at most once; drop the remainder.
 
         Args:
-            batch_size: None for all at once.
+            batch_size: Transitions per batch; None for all in one batch.
         """
         if not self.generator_ready:
             for name in (

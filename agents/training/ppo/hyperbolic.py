@@ -1,9 +1,8 @@
-"""The hyperbolic tangent of layers, by whichever way is fast on this machine.
+"""Hyperbolic tangent of layers, by the faster of two implementations on this machine.
 
-torch calls MKL for it. That takes as long as the logistic function on processors of Intel with
-AVX-512, and four to seven times as long elsewhere (2.13, one thread, 10240 x 64 numbers: 0.2
-against 0.25 ms; with MKL held to AVX2, as without AVX-512, 1.1 ms; on another machine 1.5 against
-0.15). There the logistic function is the way round, without which it was a third of all learning.
+MKL, which torch calls, takes as long as the logistic function on Intel processors with AVX-512, and
+four to seven times as long on others, a third of all learning. MKL / logistic, torch 2.13, one
+thread, 10240 x 64 numbers: 0.2 / 0.25 ms; MKL with AVX2 only 1.1 ms; other machine 1.5 / 0.15 ms.
 """
 
 from __future__ import annotations
@@ -16,13 +15,10 @@ from torch import Tensor, nn
 
 
 class FromLogistic(nn.Module):
-    """`torch.nn.Tanh` within 3e-7, by the logistic function.
-
-    Networks that are exported have the plain operation.
-    """
+    """`torch.nn.Tanh` within 3e-7, by the logistic function; exported as the plain operation."""
 
     def forward(self, x: Tensor) -> Tensor:
-        """Of each number."""
+        """Return the hyperbolic tangent of each element."""
         if torch.compiler.is_exporting():
             return torch.tanh(x)
         y: Tensor = _FromLogistic.apply(x)  # type: ignore[no-untyped-call]
@@ -46,14 +42,14 @@ class _FromLogistic(torch.autograd.Function):
 
 
 def is_fast(processor: str, features: dict[str, bool], *, mkl: bool) -> bool:
-    """Whether torch's own tangent is.
+    """Return whether torch's own hyperbolic tangent is fast.
 
-    By what the processor is and not by a clock: a run that goes on must go on with the same.
+    Decided by the processor, not by timing: a resumed run must use the same implementation.
 
     Args:
-        processor: Its name as LLVM has it.
-        features: What it can.
-        mkl: Whether torch calls MKL.
+        processor: LLVM's name of the processor.
+        features: LLVM's feature flags of the processor.
+        mkl: True if torch calls MKL.
     """
     amd = processor.startswith(("znver", "bdver", "btver"))
     return not mkl or (features.get("avx512f", False) and not amd)
@@ -62,11 +58,15 @@ def is_fast(processor: str, features: dict[str, bool], *, mkl: bool) -> bool:
 def _is_fast_here() -> bool:
     try:
         features = dict(llvmlite.binding.get_host_cpu_features())
-    except RuntimeError:  # not told here
+    except RuntimeError:  # not available on this platform
         features = {}
     name = llvmlite.binding.get_host_cpu_name()
-    return is_fast(name, features, mkl=torch.backends.mkl.is_available())  # type: ignore[no-untyped-call]
+    return is_fast(
+        name,
+        features,
+        mkl=torch.backends.mkl.is_available(),  # type: ignore[no-untyped-call]
+    )
 
 
 Tanh: type[nn.Module] = nn.Tanh if _is_fast_here() else FromLogistic
-"""Layers of policies use this."""
+"""Activation of the layers of policies."""

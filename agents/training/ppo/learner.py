@@ -1,4 +1,4 @@
-"""Proximal policy optimisation of Stable-Baselines3, set up for a swarm."""
+"""PPO of Stable-Baselines3, configured for a swarm."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from relpos_env.api.state_space import N_TRUTH
 from relpos_env.interface.actions import ContinuousActions
 
 CRITIC_ALONE = 0.1
-"""[-] Share of a run that begins with a policy in which only the critic learns: before it knows
-what that policy is worth, its errors would undo it."""
+"""[-] Share of a run with an initial policy in which only the critic is trained: the errors of an
+untrained critic would degrade that policy."""
 FALL = (0.5, 0.7)
-"""[-] Shares of the run between which the bound on the noise of actions falls."""
+"""[-] Shares of the run between which the upper limit of the action noise falls."""
 
 
 def level_of(config: TrainConfig, frames: int) -> int | None:
-    """Level of the curriculum after so many frames; None for what the scenarios say."""
+    """Return the curriculum level after `frames` agent steps; None for that of the scenarios."""
     levels = config.env.levels
     return levels[min(frames * len(levels) // config.frames, len(levels) - 1)] if levels else None
 
 
 def share_done(config: TrainConfig, frames: int) -> float:
-    """Of the run; what Stable-Baselines3 counts itself is that of the leg."""
+    """Return the completed share of the run; Stable-Baselines3 reports that of `learn` only."""
     return min(frames / config.frames, 1.0)
 
 
 def make_model(config: TrainConfig, rooms: MultiScenarioVecEnv) -> PPO:
-    """The learner with fresh weights that follow from the seed."""
+    """Return the learner with random weights, determined by the seed."""
     ppo = config.ppo
     models: list[PPO] = []
 
@@ -50,7 +50,7 @@ def make_model(config: TrainConfig, rooms: MultiScenarioVecEnv) -> PPO:
         return ppo.learning_rate * (0.01 + 0.495 * (1.0 + math.cos(math.pi * share)))
 
     with warnings.catch_warnings():
-        # Of batches that do not divide the experience: ours leaves the rest out.
+        # Batches that do not divide the experience: `SwarmRolloutBuffer` drops the remainder.
         warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
         model = PPO(
             SwarmPolicy,
@@ -73,7 +73,7 @@ def make_model(config: TrainConfig, rooms: MultiScenarioVecEnv) -> PPO:
 
 
 def network_arguments(config: TrainConfig) -> dict[str, Any]:
-    """Arguments of `SwarmPolicy` besides its spaces."""
+    """Return the arguments of `SwarmPolicy` except its spaces."""
     net = config.net
     return {
         "features": {
@@ -85,14 +85,14 @@ def network_arguments(config: TrainConfig) -> dict[str, Any]:
         "n_state": N_TRUTH * config.env.cars if net.critic == "central" else 0,
         "net_arch": [net.width] * net.layers,
         "activation_fn": Tanh,
-        # Stable-Baselines3's own, in one pass over all weights.
+        # Default of Stable-Baselines3, fused into one pass over all weights.
         "optimizer_kwargs": {"eps": 1e-5, "fused": True},
         "log_std_init": net.log_std,
     }
 
 
 def make_policy(config: TrainConfig) -> SwarmPolicy:
-    """The networks alone, to put trained weights into."""
+    """Return the networks without a learner, for trained weights."""
     arguments = network_arguments(config)
     space = observation_space(layout_of(config), with_truth=config.net.critic == "central")
     return SwarmPolicy(space, ContinuousActions().space(), lambda _: 0.0, **arguments)
@@ -101,24 +101,24 @@ def make_policy(config: TrainConfig) -> SwarmPolicy:
 def run_leg(
     model: PPO, config: TrainConfig, leg: int, tell: Callable[[int], None] | None = None
 ) -> None:
-    """Learn for one leg, from new episodes on.
+    """Train for one evaluation interval, beginning with new episodes.
 
     Args:
-        model: Learns.
-        config: How.
-        leg: Its number.
-        tell: Called with the frames of the run so far, after every rollout.
+        model: Learner.
+        config: Configuration of the run.
+        leg: Index of the evaluation interval.
+        tell: Called with the agent steps of the run so far, after every rollout.
     """
     seeds = np.random.SeedSequence([config.seed, leg]).generate_state(2)
     set_random_seed(int(seeds[0] >> 1))
     model.env.seed(int(seeds[1] >> 1))
-    # Nothing observed yet: learning begins with a reset.
+    # Without a last observation, `learn` begins with a reset.
     model._last_obs = None
     learn(model, config, tell)
 
 
 def learn(model: PPO, config: TrainConfig, tell: Callable[[int], None] | None = None) -> None:
-    """Learn for the updates of a leg, from where the episodes are; `tell` as of `run_leg`."""
+    """Train for one evaluation interval without resetting the episodes; `tell`: see `run_leg`."""
     frames = config.leg * config.ppo.steps * model.n_envs
     callbacks: list[BaseCallback] = [_Threads(config.threads), _Noise(config)]
     if tell is not None:
@@ -131,7 +131,7 @@ def learn(model: PPO, config: TrainConfig, tell: Callable[[int], None] | None = 
 
 
 class _Tells(BaseCallback):  # type: ignore[misc]
-    """Says how far learning is."""
+    """Reports the progress of training."""
 
     def __init__(self, tell: Callable[[int], None]) -> None:
         super().__init__()
@@ -145,10 +145,10 @@ class _Tells(BaseCallback):  # type: ignore[misc]
 
 
 class _Threads(BaseCallback):  # type: ignore[misc]
-    """All threads for learning, one for the networks while environments are stepped.
+    """Uses all threads of torch for updates, and one during rollouts.
 
-    The networks are small then, and a thread that helped with them stays awake for a while,
-    waiting for more, on a core that the simulation needs.
+    Batches are small during rollouts, and idle worker threads of torch spin for a while on cores
+    that the simulation needs.
     """
 
     def __init__(self, threads: int) -> None:
@@ -166,11 +166,11 @@ class _Threads(BaseCallback):  # type: ignore[misc]
 
 
 class _Noise(BaseCallback):  # type: ignore[misc]
-    """Keeps the noise of actions below a bound that falls along the run.
+    """Limits the standard deviation of actions; the limit decreases during the run.
 
-    Left to learning, noise stays at 0.2 to 0.3 of the largest speed and steering, and policies
-    rely on it: the most likely action alone stands where noise would have moved the car. With less
-    noise from the start, they learn more slowly.
+    Without a limit, the noise stays at 0.2 to 0.3 of the largest speed and steering, and policies
+    depend on it: the most likely action leaves the car at rest in places where noise would move
+    it. Less noise from the start slows training down.
     """
 
     def __init__(self, config: TrainConfig) -> None:
@@ -191,7 +191,7 @@ class _Noise(BaseCallback):  # type: ignore[misc]
 
 
 class _CriticAlone(BaseCallback):  # type: ignore[misc]
-    """Keeps the actor as it was given until the critic has learned what it is worth."""
+    """Freezes the actor until the critic has been trained on the initial policy."""
 
     def __init__(self, config: TrainConfig) -> None:
         super().__init__()
@@ -209,7 +209,7 @@ class _CriticAlone(BaseCallback):  # type: ignore[misc]
 
 
 class _Weights(BaseCallback):  # type: ignore[misc]
-    """Takes the weights of reward terms to their final values along the run."""
+    """Changes the reward weights to their final values during the run."""
 
     def __init__(self, config: TrainConfig) -> None:
         super().__init__()

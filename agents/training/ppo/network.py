@@ -1,9 +1,9 @@
-"""The networks of a policy that all cars share, for any number of others.
+"""Networks of a policy that all cars share, for any number of other cars.
 
-Every other car goes through the same small network, the mean over those that count is joined
-with what the car knows of itself (deep sets [1]), so the order of the others does not matter and
-absent ones leave no trace. Observations are scaled by fixed lengths and times, in the network:
-what is exported needs no statistics next to it.
+A shared encoder is applied to every other car; the mean over the valid ones is concatenated with
+the car's own features (deep sets [1]), so the output does not depend on the order of the others
+or on absent ones. Observations are scaled by constants inside the network: exported networks need
+no separate statistics.
 
 References:
     [1] Zaheer et al., Deep sets, NeurIPS 30 (2017).
@@ -30,17 +30,17 @@ SCALES = {
     "pos": 2.0, "vel": 1.0, "std": 0.3, "age": 1.0, "target": 2.0, "range": 2.0, "gap": 10.0,
     "command": 1.0, "motion": 1.0, "near": 1.0,
 }  # fmt: skip
-"""Field to the value that becomes 1, in the field's unit; 1 for those not named."""
+"""Scale by observation field: the value that becomes 1, in the field's unit; 1 by default."""
 CLOSE = 0.5
-"""[m] What a beam sees nearer than this has a feature of its own, which is 1 at a touch."""
+"""[m] Distance sensors have a second feature, from 0 at this reading to 1 at contact."""
 ERROR_SCALE = 0.2
-"""[m] Distance from a place that becomes 1."""
+"""[m] Distance of a car from its target that becomes 1."""
 LIMIT = 5.0
-"""[-] Scaled numbers are cut at this."""
+"""[-] Scaled numbers are clipped to this absolute value."""
 
 
 class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
-    """What a car sees, as features that do not depend on the order of the others."""
+    """Features of an observation, invariant to the order of the other cars."""
 
     def __init__(
         self,
@@ -52,15 +52,15 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         width: int,
         depth: int,
     ) -> None:
-        """Lay the network out.
+        """Build the network.
 
         Args:
-            observation_space: Of one car; `n_state` numbers of the truth may follow.
-            fields: Stretches of one observation.
-            history: So many observations in one.
-            n_state: Numbers behind the observation that are seen as well; for critics.
+            observation_space: Observations of one car, optionally with ground truth appended.
+            fields: Fields of one observation.
+            history: Number of stacked observations.
+            n_state: Numbers of ground truth after the observation that are inputs, for critics.
             width: Units of each layer.
-            depth: Layers for each of the others.
+            depth: Layers of the encoder of the other cars.
         """
         super().__init__(observation_space, features_dim=2 * width + 1)
         where = _Where(fields, history)
@@ -74,7 +74,7 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         self._keep("wanted", where.newest["wanted"])
         self._has_places, self._has_beams = where.places is not None, where.near is not None
         self.skips_absent = True
-        """Whether others that do not count are left out, which changes nothing but the time."""
+        """True if other cars with zero weight are skipped, which only affects the run time."""
         if where.near is not None:
             self._keep("near", where.near)
         width_in = where.others.shape[1]
@@ -90,7 +90,7 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         self.of_own = nn.Sequential(nn.Linear(n_own, width), Tanh())
 
     def forward(self, observations: Tensor) -> Tensor:
-        """Features, (batch, feature)."""
+        """Return the features, (batch, feature)."""
         seen = observations[:, : self._n_seen]
         scaled = (seen * self._gain).clamp(-LIMIT, LIMIT)
         others = self._by_other(scaled.index_select(1, self._others))
@@ -111,11 +111,11 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         return torch.cat([mean, self.of_own(own), 0.2 * count], dim=-1)
 
     def _sum_of(self, others: Tensor, weight: Tensor) -> Tensor:
-        """Sum over the others, by their weights, of what the small network makes of each."""
+        """Return the weighted sum of the encoded other cars, (batch, width)."""
         if torch.compiler.is_exporting() or not self.skips_absent:
             total: Tensor = (self.of_other(others) * weight[:, :, None]).sum(dim=1)
             return total
-        # In rooms with fewer cars than slots, many of the others are absent: they cost nothing.
+        # Absent cars cost nothing; there are many in environments with fewer cars than slots.
         counts = weight.flatten().nonzero().squeeze(1)
         made = self.of_other(others.flatten(0, 1).index_select(0, counts))
         made = made * weight.reshape(-1, 1).index_select(0, counts)
@@ -126,22 +126,22 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         return flat.reshape(-1, self._n_others, flat.shape[1] // self._n_others)
 
     def _keep(self, name: str, array: I64 | F32) -> None:
-        """Constants of the layout, which are not among the weights."""
+        """Register a constant of the layout as a buffer that is not saved with the weights."""
         self.register_buffer(f"_{name}", torch.from_numpy(array), persistent=False)
 
 
 class SwarmPolicy(ActorCriticPolicy):  # type: ignore[misc]
-    """Actor and critic with features of their own; a central critic sees the truth as well."""
+    """Actor and critic with separate features; a central critic also observes ground truth."""
 
     def __init__(
         self, *args: Any, features: dict[str, Any], n_state: int = 0, **kwargs: Any
     ) -> None:
-        """Build both.
+        """Build the actor and the critic.
 
         Args:
             args: As for `ActorCriticPolicy`.
             features: Arguments of `SwarmFeatures`.
-            n_state: So many numbers of the truth follow every observation, for the critic alone.
+            n_state: Numbers of ground truth after every observation, for the critic only.
             kwargs: As for `ActorCriticPolicy`.
         """
         self._features, self._n_state, self._made = features, n_state, 0
@@ -153,14 +153,14 @@ class SwarmPolicy(ActorCriticPolicy):  # type: ignore[misc]
         )
 
     def make_features_extractor(self) -> SwarmFeatures:
-        """The actor's at the first call, the critic's at the second."""
+        """Return the features of the actor at the first call, of the critic at the second."""
         n_state = self._n_state if self._made else 0
         self._made += 1
         return SwarmFeatures(self.observation_space, n_state=n_state, **self._features)
 
 
 class Actor(nn.Module):
-    """What drives a car, alone: observations to the most likely actions, within their limits."""
+    """Deterministic actor: observations to the most likely actions, within their limits."""
 
     def __init__(self, policy: SwarmPolicy) -> None:
         super().__init__()
@@ -169,13 +169,13 @@ class Actor(nn.Module):
         self._action = policy.action_net
 
     def forward(self, observations: Tensor) -> Tensor:
-        """Speed and steering as shares of their largest values, (batch, 2)."""
+        """Return speed and steering as shares of their largest values, (batch, 2)."""
         actions: Tensor = self._action(self._layers(self._features(observations)))
         return actions.clamp(-1.0, 1.0)
 
 
 class _Where:
-    """Where things stand in an observation with its history."""
+    """Indices of the fields in an observation with its history."""
 
     def __init__(self, fields: Sequence[Field], history: int) -> None:
         n_others = next(f.size for f in fields if f.name == "mask")
@@ -191,20 +191,20 @@ class _Where:
         self.others = _join([stands[f.name] for f in fields if f.per_other])
         self.own = _join([stands[f.name] for f in fields if not f.per_other])[0]
         self.near = stands["near"].ravel() if "near" in stands else None
-        # A car counts whose position is known, or that has a place; the newest says.
+        # A car is valid if its newest observation has a position or a target.
         self.newest = {n: np.ascontiguousarray(stands[n][0, :, 0]) for n in ("mask", "wanted")}
         self.gain = np.ones(self.size, np.float32)
         for f in fields:
             self.gain[stands[f.name].ravel()] = 1.0 / SCALES.get(f.name, 1.0)
         self.places: dict[str, I64] | None = None
         if "pos" in stands:
-            # Of each coordinate of each observation: place, whether it is known, and wanted.
+            # For each coordinate of each observation: position, target and their masks.
             twice = {n: np.repeat(stands[n], 2, axis=-1) for n in ("mask", "wanted")}
             named = {"pos": stands["pos"], "target": stands["target"], **twice}
             self.places = {f"place_{n}": _join([index]) for n, index in named.items()}
 
 
 def _join(parts: Sequence[I64]) -> I64:
-    """Index arrays (history, other, number) side by side, (other, history x number)."""
+    """Concatenate index arrays (history, other, number) to (other, history x number)."""
     joined = np.concatenate(parts, axis=-1)
     return np.ascontiguousarray(np.moveaxis(joined, 0, 1).reshape(joined.shape[1], -1))
