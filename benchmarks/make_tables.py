@@ -1,9 +1,9 @@
-"""Tables of the documents that follow from the code.
+"""Generated tables of the documents.
 
-python benchmarks/make_tables.py            writes them again
+python benchmarks/make_tables.py            regenerates them
 python benchmarks/make_tables.py --check    fails if one differs
 
-A table stands between ``<!-- table: NAME -->`` and ``<!-- end of table -->``.
+A table is enclosed by ``<!-- table: NAME -->`` and ``<!-- end of table -->``.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ from tracking.findings import KINDS
 ROOT = Path(__file__).resolve().parents[1]
 DOCS, MEASURED = ROOT / "docs", ROOT / "benchmarks" / "results"
 CARS = 3
-"""So many cars have the observations whose indices are shown."""
+"""[-] Cars of the observations whose indices are shown."""
 RESULTS = MEASURED / "tracker-results.jsonl"
-"""Figures of the filters, of `measure_results.py`."""
+"""Metrics of the filters, written by `measure_results.py`."""
 BLOCK = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 
 
 def markdown(head: Iterable[str], rows: Iterable[Iterable[str]], right: str = "") -> str:
-    """A table; `right` names the columns that are set to the right."""
+    """Return a Markdown table; `right` names the right-aligned columns."""
     head = list(head)
     rule = ["--:" if name in right.split(", ") else "---" for name in head]
     lines = ["| " + " | ".join(cells) + " |" for cells in (head, *rows)]
@@ -65,7 +65,7 @@ def markdown(head: Iterable[str], rows: Iterable[Iterable[str]], right: str = ""
 
 
 def in_others(at_two: int, at_three: int) -> str:
-    """A size that is linear in the number of cars n, from those for two and three."""
+    """Return a size linear in the number of cars n as text, from those for two and three cars."""
     slope = at_three - at_two
     rest = at_two - slope
     if slope == 0:
@@ -75,7 +75,7 @@ def in_others(at_two: int, at_three: int) -> str:
 
 
 def sizes() -> str:
-    """How long the observations of every mode are."""
+    """Return the table of the observation sizes of all modes."""
     rows = []
     for name in OBSERVATIONS:
         two, three = observation_mode(name, 2), observation_mode(name, CARS)
@@ -87,7 +87,7 @@ def sizes() -> str:
 
 
 def observations(mode: str) -> str:
-    """The vector of one mode: for three cars, and how it grows."""
+    """Return the layout of one observation mode for three cars, with sizes for n cars."""
     small = observation_mode(mode, 2).fields
     large = observation_mode(mode, CARS).fields
     rows = []
@@ -101,7 +101,7 @@ def observations(mode: str) -> str:
 
 
 def continuous() -> str:
-    """What the two numbers of a continuous action mean."""
+    """Return the table of the continuous action."""
     return markdown(
         ("index", "values", "meaning"),
         [
@@ -112,7 +112,7 @@ def continuous() -> str:
 
 
 def discrete() -> str:
-    """What every number of a discrete action means."""
+    """Return the table of the discrete actions."""
     mode = DiscreteActions()
     assert isinstance(ACTIONS["discrete"](), DiscreteActions)
     head = ["speed \\ steering [rad]", *(f"{angle:+.2f}" for angle in mode.angles)]
@@ -128,7 +128,7 @@ def discrete() -> str:
 
 
 def weights() -> str:
-    """Reward terms of every task and how much they count."""
+    """Return the table of the reward weights of all tasks."""
     terms: list[str] = []
     for task in TASKS:
         terms += [t for t in DEFAULT_WEIGHTS[task] if t not in terms]
@@ -146,7 +146,7 @@ def weights() -> str:
 
 
 def arguments() -> str:
-    """The fields of a configuration."""
+    """Return the table of the fields of a configuration."""
     told = docstrings(config.FormationConfig)
     rows = []
     for f in fields(config.FormationConfig):
@@ -155,7 +155,7 @@ def arguments() -> str:
 
 
 def default_of(f: Field[Any]) -> str:
-    """A default as one would write it."""
+    """Return the default of a field as Python code."""
     if f.default is not MISSING:
         return repr(f.default)
     assert f.default_factory is not MISSING
@@ -164,7 +164,7 @@ def default_of(f: Field[Any]) -> str:
 
 
 def docstrings(cls: type) -> dict[str, str]:
-    """The strings under the fields of a dataclass or enum, each in one line."""
+    """Return the docstrings of the fields of a dataclass or enum, each in one line."""
     (body,) = ast.parse(inspect.getsource(cls)).body
     assert isinstance(body, ast.ClassDef)
     told = {}
@@ -178,7 +178,7 @@ def docstrings(cls: type) -> dict[str, str]:
 
 
 def scenarios() -> str:
-    """The scenarios that come with the package."""
+    """Return the table of the scenarios of the package."""
     rows = []
     for name in SCENARIOS:
         s = SCENARIOS[name]
@@ -191,7 +191,7 @@ def scenarios() -> str:
 
 
 def drawn(s: Scenario) -> str:
-    """What a scenario draws for every episode besides the poses."""
+    """Return the randomisation of a scenario per episode, apart from poses, as text."""
     for k, level in enumerate(LEVELS):
         if s.randomisation == level:
             return f"level {k}" if k else ""
@@ -207,7 +207,7 @@ def drawn(s: Scenario) -> str:
 
 
 def training() -> str:
-    """Everything a training run depends on."""
+    """Return the table of the options of a training run."""
     rows = []
     for leaf in leaves(TrainConfig):
         default = ",".join(map(str, leaf.default)) if leaf.many else leaf.default
@@ -217,7 +217,7 @@ def training() -> str:
 
 
 def driver(name: str) -> str:
-    """The options of a car driver."""
+    """Return the table of the options of a motor driver."""
     options = DRIVERS[name].options
     told = docstrings(options)
     rows = [[f"`{f.name}`", f"`{default_of(f)}`", told[f.name]] for f in fields(options)]
@@ -225,7 +225,7 @@ def driver(name: str) -> str:
 
 
 def decoders() -> str:
-    """The formats of devices that can be read."""
+    """Return the table of the supported device formats."""
     rows = []
     for name, entry in DECODERS.items():
         tells = ", ".join(kind.__name__.removesuffix("Reading").lower() for kind in entry.tells)
@@ -238,7 +238,7 @@ def decoders() -> str:
 
 
 def safety_rules() -> str:
-    """The rules of the safety gate, in the order in which reasons are told."""
+    """Return the table of the rules of the safety gate, in order of reporting."""
     rows = []
     for rule in RULES:
         does = inspect.getdoc(rule.check) or ""
@@ -247,14 +247,14 @@ def safety_rules() -> str:
 
 
 def safety_limits() -> str:
-    """The limits of the safety gate."""
+    """Return the table of the limits of the safety gate."""
     told = docstrings(SafetyParams)
     rows = [[f"`{f.name}`", f"`{default_of(f)}`", told[f.name]] for f in fields(SafetyParams)]
     return markdown(("limit", "default", "meaning"), rows)
 
 
 def alignment() -> str:
-    """The states of a group's alignment, and what follows each of them and why."""
+    """Return the table of the alignment states and their transitions."""
     rows = []
     for state, following in TRANSITIONS.items():
         then = "; ".join(f"{why}: `{after.name}`" for after, why in following.items())
@@ -263,6 +263,7 @@ def alignment() -> str:
 
 
 def faults() -> str:
+<<<<<<< HEAD
     """The catalogue of faults."""
     meaning = docstrings(Fault)
     rows = [
@@ -270,10 +271,16 @@ def faults() -> str:
         for f, r in CATALOGUE.items()
     ]
     return markdown(("fault", "meaning", "limit", "decided", "action"), rows)
+=======
+    """Return the table of faults and the actions on them."""
+    told = docstrings(Fault)
+    rows = [[f"`{f.name}`", " ".join(told[f.name].split()), do] for f, do in REMEDIES.items()]
+    return markdown(("fault", "what it is", "action"), rows)
+>>>>>>> fcb65c2fa265b103422906ad57d8b7997a6c4073
 
 
 def findings() -> str:
-    """What may be amiss with a recording."""
+    """Return the table of findings in recordings."""
     order = ("error", "warning", "note")
     kinds = sorted(KINDS.items(), key=lambda item: order.index(item[1].severity))
     rows = [[f"`{name}`", kind.severity, kind.meaning, kind.remedy] for name, kind in kinds]
@@ -281,7 +288,7 @@ def findings() -> str:
 
 
 def second_world() -> str:
-    """Errors in the second world."""
+    """Return the table of errors in the second world."""
     head = ("", "worlds", "rmse_yaw / shape", "over the bound", "NEES", "`ok`", "`ok` and wrong",
             "`ok` and within its accuracy")  # fmt: skip
     rows = []
@@ -297,7 +304,7 @@ def second_world() -> str:
 
 
 def policy_results() -> str:
-    """Errors of the shipped policy with distance sensors, next to those of controllers."""
+    """Return the table of errors of the shipped policy with distance sensors and of controllers."""
     head = ("room", "cars", "driver", "error", "95 %", "place", "tracking", "collisions/min",
             "in contact", "in formation", "ratio to the best controller")  # fmt: skip
     rows, before = [], ""
@@ -319,13 +326,13 @@ def policy_results() -> str:
 
 
 def results(is_recording: bool) -> list[dict[str, Any]]:
-    """Lines of the recordings, or those of the simulated rooms."""
+    """Return the result lines of recordings or of simulated rooms."""
     lines = [json.loads(line) for line in RESULTS.read_text().splitlines()]
     return [line for line in lines if ("from" in line) == is_recording]
 
 
 def room_results() -> str:
-    """Errors of all filters in the rooms of the paper."""
+    """Return the table of errors of all filters in the rooms of the paper."""
     head = ("room", "filter", "the paper's number (hardware)", "rmse", "rmse_yaw", "rmse_shape",
             "bound yaw / shape", "ratio yaw / shape", "lost", "`ok`", "`ok` and wrong",
             "NEES")  # fmt: skip
@@ -348,7 +355,7 @@ def room_results() -> str:
 
 
 def recording_results() -> str:
-    """Errors on recordings, and those expected of an efficient estimator."""
+    """Return the table of errors on recordings and of an efficient estimator."""
     found: dict[tuple[str, float], dict[str, str]] = {}
     for r in results(is_recording=True):
         errors = f"{r['rmse']:.2f} / {r['rmse_yaw']:.3f} / {r['rmse_shape']:.3f}"
@@ -362,7 +369,7 @@ def recording_results() -> str:
 
 
 def mds_results() -> str:
-    """Errors of `joint` and of multidimensional scaling of each instant."""
+    """Return the table of errors of `joint` and of MDS of each instant."""
     rows = []
     for line in map(json.loads, (MEASURED / "mds-results.jsonl").read_text().splitlines()):
         errors = ["-" if line[k] is None else f"{line[k]:.2f}" for k in ("joint", "mds")]
@@ -372,7 +379,7 @@ def mds_results() -> str:
 
 
 def parameters(params: Any, names: tuple[str, ...]) -> str:
-    """Parameters of a stage, those of its parts among them."""
+    """Return the table of the parameters of a stage, those of its parts included."""
     rows = []
     for name in ("", *names):
         part = getattr(params, name) if name else params
@@ -428,20 +435,20 @@ TABLES: dict[str, Callable[[], str]] = {
     "safety-rules": safety_rules,
     "safety-limits": safety_limits,
 }
-"""Name to what makes it."""
+"""Name of a table to the function that returns it."""
 
 
 def rewrite(text: str) -> str:
-    """A page with its tables made again.
+    """Return a page with regenerated tables.
 
     Raises:
-        KeyError: It has a table of which nothing is known.
+        KeyError: The page has an unknown table.
     """
     return BLOCK.sub(lambda match: f"{match[1]}{TABLES[match[2]]()}{match[3]}", text)
 
 
 def main(check: bool) -> list[str]:
-    """Rewrite all pages, or only say which differ; returns their names."""
+    """Return the names of pages with outdated tables; rewrite the pages unless `check`."""
     differ = []
     for page in (*sorted(DOCS.rglob("*.md")), ROOT / "README.md"):
         old = page.read_text()

@@ -1,4 +1,4 @@
-"""The laws of `tracking.filters.base.Filter`, for every registered filter."""
+"""Invariants of `tracking.filters.base.Filter`, for every registered filter."""
 
 from dataclasses import fields, replace
 
@@ -25,16 +25,16 @@ def assert_identical(a: TeamEstimate, b: TeamEstimate) -> None:
 
 
 def needs_no_layout(name):
-    """Skip the paper's algorithm, which is given the rotation and reflection of its start."""
+    """Skip the paper's algorithm, which needs its initial rotation and reflection as input."""
     if name.startswith("paper"):
         pytest.skip("the paper names no rotation and reflection of the first layout")
 
 
 def steady(layout):
-    """The paper's filter with a first layout and without its speed model.
+    """Return parameters of the paper's filter with a first layout and without its speed model.
 
-    With the norm of the velocity any rounding grows a thousandfold in two seconds, with ranges
-    that are trusted to centimetres not much less.
+    With the norm of the velocity, rounding errors grow 1000-fold in two seconds; with small range
+    noise of centimetres nearly as much.
     """
     first = tuple(tuple(map(float, p)) for p in layout)
     return PaperParams(
@@ -43,9 +43,9 @@ def steady(layout):
 
 
 def put_on_truth(state, group, turn=None, clock=0.0):
-    """Give every hypothesis of a filter's state the true positions and velocities.
+    """Set positions and velocities of every hypothesis of a filter's state to the truth.
 
-    Turned by the matrix `turn`, if there is one; `clock` is what the state's times began with.
+    `turn` is an optional rotation matrix, `clock` the time origin of the state [s].
     """
     h = 1e-4
     turn = np.eye(3) if turn is None else turn
@@ -68,7 +68,7 @@ def put_on_truth(state, group, turn=None, clock=0.0):
 
 
 def half_on_truth(name, group, block, turn=None, params=None, clock=0.0):
-    """The estimate at the end, of a filter that was put on the truth at half time."""
+    """Return the final estimate of a filter that is set to the truth at half time."""
     tracker = Tracker(group.constellation, params, filter=name)
     half = block.n_events // 2
     tracker.step(block.take(slice(0, half)), block.t[0, half - 1])
@@ -83,9 +83,9 @@ def times(group, n=60):
 
 
 def test_noiseless_data_keep_zero_error(name, make_group):
-    """Put on the truth, a filter stays on it: its models are those of the world.
+    """A filter that is set to the truth keeps it, since its models match the world.
 
-    Without the speed measurement: a low-passed derivative lags, with or without noise.
+    The speed measurement is disabled: a low-passed derivative lags even without noise.
     """
     group = make_group(n=4, seconds=30.0, hz=250.0)
     pair, paper = PairEkfParams(), PaperParams(speed="rate", speed_std=1e3)
@@ -96,7 +96,7 @@ def test_noiseless_data_keep_zero_error(name, make_group):
 
 
 def test_between_measurements_the_estimate_goes_on_as_fast_as_it_says(name, group):
-    """No measurement, so positions change by the reported velocity times the time."""
+    """Without measurements, positions change by the reported velocity times the time."""
     last = group.block.t[0, -1]
     t = last + np.arange(0.01, 0.08, 0.01)
     estimate = Tracker(group.constellation, filter=name).run(group.block, t)
@@ -208,7 +208,7 @@ def test_covariance_stays_symmetric_and_positive(name, group):
 @settings(max_examples=25, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.9), wild=st.floats(0.0, 0.5))
 def test_survives_any_ranges(name, group, seed, share, wild):
-    """Lost, absurd and doubled measurements in any mixture: finite and positive definite."""
+    """Lost, repeated and wrong measurements leave estimates finite and positive definite."""
     rng = np.random.default_rng(seed)
     block = group.block.take(np.nonzero(rng.random(group.block.n_events) > share)[0])
     values = block.values.copy()
@@ -242,7 +242,7 @@ def test_a_node_that_is_silent_leaves_and_returns(name, make_group):
 
 
 def test_a_surveyed_node_that_falls_silent_comes_back(name, make_group):
-    """A distance that was surveyed once is not forgotten with the node's filters."""
+    """A surveyed distance is kept when the node's filter states are removed."""
     group = make_group(n=4, seconds=24.0)
     nodes = list(group.constellation.nodes)
     for k in (2, 3):
@@ -272,19 +272,18 @@ def test_a_surveyed_node_that_falls_silent_comes_back(name, make_group):
     assert estimate.status[1, pair] in (Status.ABSENT, Status.STARTING)
     assert estimate.status[2, pair] in (Status.OK, Status.AMBIGUOUS)
     if name == "joint":
-        # Known as exactly as it was surveyed, at the start and again.
+        # As accurate as the survey, at the start and after the return.
         length = np.linalg.norm(estimate.pos_ij_w[[0, 2], pair], axis=-1)
         np.testing.assert_allclose(length, distance[0, 0], atol=0.01)
 
 
 def test_turning_the_world_turns_the_estimate(name, group):
-    """A quarter turn of every acceleration and orientation, the ranges as they were.
+    """All accelerations and orientations are rotated by 90 degrees, ranges are unchanged.
 
-    Put on the truth at half time: a wrong hypothesis that falls in with its ranges after all
-    does so from an unstable balance, which makes any rounding larger by a factor of a million.
-    In `joint` one rotation stands for all in the first half second; what its covariance has of
-    that is not forgotten to the last digit. In `ekf` nothing but accelerations hold a pair across
-    its line of sight, so rounding errors grow there.
+    The filter is set to the truth at half time: a wrong hypothesis converges from an unstable
+    equilibrium, which amplifies rounding errors by 10^6. `joint` propagates one rotation for all
+    in the first half second; its effect on the covariance decays slowly. In `ekf` only
+    accelerations determine a pair across its line of sight, so rounding errors grow there.
     """
     atol = {"joint": 1e-4, "ekf": 1e-5}.get(name, 1e-6)
     b = group.block
@@ -309,8 +308,8 @@ def test_turning_the_world_turns_the_estimate(name, group):
 
 
 def test_shifting_the_clock_changes_nothing(name, group):
-    """From nothing; without MDS and in the paper's algorithm from the truth at half time, for
-    their starts make rounding larger: `ekf` makes 1 mm of 1e-13 m in the first ranges."""
+    """Cold start; filters without MDS and the paper's are set to the truth at half time, since
+    their starts amplify rounding errors: in `ekf`, 1e-13 m in the first ranges becomes 1 mm."""
     shifted, end = replace(group.block, t=group.block.t + 512.0), group.t[-1]
     if name not in ("joint", "ekf-mds"):
         one = half_on_truth(name, group, group.block)
