@@ -263,7 +263,6 @@ def alignment() -> str:
 
 
 def faults() -> str:
-<<<<<<< HEAD
     """The catalogue of faults."""
     meaning = docstrings(Fault)
     rows = [
@@ -271,12 +270,6 @@ def faults() -> str:
         for f, r in CATALOGUE.items()
     ]
     return markdown(("fault", "meaning", "limit", "decided", "action"), rows)
-=======
-    """Return the table of faults and the actions on them."""
-    told = docstrings(Fault)
-    rows = [[f"`{f.name}`", " ".join(told[f.name].split()), do] for f, do in REMEDIES.items()]
-    return markdown(("fault", "what it is", "action"), rows)
->>>>>>> fcb65c2fa265b103422906ad57d8b7997a6c4073
 
 
 def findings() -> str:
