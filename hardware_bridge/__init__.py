@@ -28,3 +28,28 @@ Host time is nanoseconds of a monotonic clock and always an argument; only owner
 process read the clock. Errors that a user can correct are `errors.BridgeError`.
 docs/explanation/architecture.md has a diagram.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_MODULES = {
+    "Bridge": "hardware_bridge.live.bridge",
+    "BridgeError": "hardware_bridge.errors",
+    "HardwareFormationEnv": "hardware_bridge.live.env",
+    "open_replay": "hardware_bridge.live.replay",
+    "read_config": "hardware_bridge.config",
+    "read_recording": "hardware_bridge.recording.reader",
+}
+"""Module of each name, imported on first use."""
+
+__all__ = [
+    "Bridge", "BridgeError", "HardwareFormationEnv", "open_replay", "read_config", "read_recording",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULES[name]), name)

@@ -6,6 +6,32 @@ environment of the latter; `relpos_env.simulation.simulation` is the simulation 
 interface around it.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
 from relpos_env.api.registration import register_environments
 
 register_environments()
+
+_CLASSES = {
+    "EnvError": "relpos_env.errors",
+    "FormationGymEnv": "relpos_env.api.gym_env",
+    "FormationVecEnv": "relpos_env.api.sb3_vec_env",
+    "FormationVectorEnv": "relpos_env.api.vector_env",
+    "Scenario": "relpos_env.scenarios",
+    "Simulation": "relpos_env.simulation.simulation",
+}
+"""Module of each class, imported on first use."""
+
+__all__ = [
+    "EnvError", "FormationGymEnv", "FormationVecEnv", "FormationVectorEnv", "Scenario",
+    "Simulation", "formation_v0",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _CLASSES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_CLASSES[name]), name)
