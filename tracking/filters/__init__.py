@@ -1,4 +1,4 @@
-"""Position filters. Adding one: a folder next to `joint` and a line in `FILTERS`."""
+"""Position filters. A new one needs a folder next to `joint` and a line in `FILTERS`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ DESCRIPTIONS = {
     "paper-ekf-mds": "Armani and Holz, as the text of their paper has it",
     "paper-ekf": "the same without MDS",
 }
-"""What each of them is, in a few words."""
+"""Short description of each filter."""
 
 DEFAULT_FILTER = "joint"
 
@@ -41,14 +41,14 @@ DEFAULT_FILTER = "joint"
 def filter_builder(
     name: str | FilterBuilder,
 ) -> FilterBuilder:
-    """Look a filter up.
+    """Return the builder of a filter.
 
     Args:
         name: One of `FILTERS`, ``package.module:Name``, a name among the entry points
             ``relpos_env.filters``, or a builder itself.
 
     Raises:
-        ConfigError: No filter of that name.
+        ConfigError: No filter has that name.
     """
     return look_up(FILTERS, name, "filter", group="relpos_env.filters")
 

@@ -1,4 +1,4 @@
-"""What every filter is: events in, estimates out."""
+"""Interface of the position filters: events in, estimates out."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from tracking.measurements import MeasurementBlock
 class Filter(Protocol):
     """A position filter over a batch of groups.
 
-    Laws, tested for every registered filter: a step without events changes nothing; any split
-    into blocks gives the same estimate; environment k of a batch is that environment alone;
-    noiseless data give zero error; swapping i and j mirrors; saved and restored in mid-run is
-    uninterrupted.
+    Properties tested for every registered filter: a step without events changes nothing; any
+    split into blocks gives the same estimate; environment k of a batch gives the same as alone;
+    noiseless data give zero error; swapping i and j mirrors the estimate; a run that is saved and
+    restored continues as if uninterrupted.
     """
 
     follows_bias: bool
-    """True if slow errors of the accelerations are among its states: tilts may then err for long,
-    and need not be corrected by what is gravity only in the mean."""
+    """True if slow acceleration errors are among the states. Tilt errors may then last, so VQF may
+    trust its accelerometer less (`VehicleParams.ahrs_accel_tau_with_bias`)."""
 
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
-        """Handle the events and report at the given times.
+        """Process the events and return the estimates at the given times.
 
         Args:
-            block: Events in order, later than any handled before. STATE, not IMU.
+            block: Events in order, later than all processed ones; STATE events, not IMU events.
             t_out: Times of the estimates, ascending, (env, time) [s].
 
         Returns:
@@ -36,33 +36,33 @@ class Filter(Protocol):
         """
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
-        """`run` for arrays that stay where they are, without its overhead.
+        """Return a function that does `run` on fixed arrays, without its overhead.
 
         Args:
-            block: Filled again before every call, contiguous.
-            estimate: Written by every call for its times `t`, (env, time), filled before.
+            block: Events, contiguous arrays that are filled again before every call.
+            estimate: Written by every call for its times `t`, (env, time), which are set before.
         """
 
     def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
-        """Kernels, with arguments of their types, in groups that share little code.
+        """Return the kernels, with arguments of their types, in groups that share little code.
 
-        The first group is needed by every event, the others now and then.
+        Every event needs the first group; the others are needed now and then.
         """
 
     def reset(self, env: int) -> None:
-        """Forget everything of one environment."""
+        """Reset one environment to the state before any measurement."""
 
     def part(self, envs: slice) -> Filter:
-        """Some of the environments, without a step between them; shares their memory."""
+        """Return the filter of some environments, a slice of step 1, which shares their memory."""
 
     def save(self) -> Any:
-        """A copy of everything that evolves."""
+        """Return a copy of the state."""
 
     def restore(self, saved: Any) -> None:
-        """Go on from a saved copy."""
+        """Restore the state from a saved copy."""
 
     def mean_nis(self) -> F64:
-        """Mean NIS over all accepted ranges, (env) [-]; NaN before the first."""
+        """Return the mean NIS over all accepted ranges, (env) [-]; NaN before the first."""
 
     def n_rejected(self) -> F64:
-        """Ranges refused as outliers, (env)."""
+        """Return the number of ranges rejected as outliers, (env)."""

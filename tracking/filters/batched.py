@@ -1,4 +1,4 @@
-"""What filters over a batch of groups have in common: a state of arrays with a leading env axis."""
+"""Base class of filters over a batch of groups: the state is arrays with a leading env axis."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ class BatchedFilter(ABC):
 
     follows_bias: bool
     kernel: ClassVar[Callable[..., Any]]
-    """Handles the events; takes what `_arguments` gives."""
+    """Kernel that processes the events, called with the result of `_arguments`."""
 
     def __init__(self, constellation: Constellation, state: Any, blank: Any) -> None:
-        """Keep the arrays.
+        """Store the arrays.
 
         Args:
             constellation: The nodes.
-            state: Of all environments.
-            blank: Of one before any measurement, arrays (1, ...) that broadcast to `state`.
+            state: State of all environments.
+            blank: State of one environment before any measurement, arrays (1, ...).
         """
         self._constellation, self._state, self._blank = constellation, state, blank
 
     @abstractmethod
     def _arguments(self, events: tuple[Any, ...], estimate: TeamEstimate) -> tuple[Any, ...]:
-        """What the kernel takes."""
+        """Return the arguments of the kernel."""
 
     def run(self, block: MeasurementBlock, t_out: F64) -> TeamEstimate:
-        """Handle the events and report at the given times; see `Filter.run`."""
-        # Writable, as all arrays that kernels are compiled for.
+        """Process the events and return the estimates at the given times; see `Filter.run`."""
+        # A writable copy, as all arrays that kernels are compiled for.
         t_out = np.array(t_out, dtype=np.float64, order="C")
         estimate = TeamEstimate.empty(self._constellation, t_out)
         arguments = self._arguments(block.arrays, estimate)
@@ -51,44 +51,44 @@ class BatchedFilter(ABC):
         return estimate
 
     def _complete(self, handle: Callable[[], Any], arguments: tuple[Any, ...]) -> None:
-        """Call the kernel, with its arguments, until all events are handled."""
+        """Call the kernel, with its arguments, until all events are processed."""
         handle()
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
-        """`run` for arrays that stay where they are; see `Filter.bind`."""
+        """Return a function that does `run` on fixed arrays; see `Filter.bind`."""
         return bind(type(self).kernel, *self._arguments(block.in_place, estimate))
 
     def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
-        """What is compiled for it; see `Filter.calls`."""
+        """Return the kernels to compile; see `Filter.calls`."""
         return [[(type(self).kernel, self._arguments(block.in_place, estimate))]]
 
     def reset(self, env: int) -> None:
-        """Forget everything of one environment."""
+        """Reset one environment to the state before any measurement."""
         for array, blank in zip(self._state, self._blank, strict=True):
             array[env] = blank[0]
 
     def part(self, envs: slice) -> Self:
-        """Some of the environments; shares their memory."""
+        """Return the filter of some environments, which shares their memory."""
         part = copy.copy(self)
         part._state = type(self._state)._make(array[envs] for array in self._state)
         return part
 
     def save(self) -> Any:
-        """A copy of everything that evolves."""
+        """Return a copy of the state."""
         return type(self._state)._make(array.copy() for array in self._state)
 
     def restore(self, saved: Any) -> None:
-        """Go on from a saved copy."""
+        """Restore the state from a saved copy."""
         for array, old in zip(self._state, saved, strict=True):
             array[...] = old
 
     def mean_nis(self) -> F64:
-        """Mean NIS over all accepted ranges, (env) [-]; NaN before the first."""
+        """Return the mean NIS over all accepted ranges, (env) [-]; NaN before the first."""
         group = self._state.group[:, 0]
         n = group["nis_n"]
         mean: F64 = np.where(n > 0, group["nis_sum"] / np.maximum(n, 1), np.nan)
         return mean
 
     def n_rejected(self) -> F64:
-        """Ranges refused as outliers, (env)."""
+        """Return the number of ranges rejected as outliers, (env)."""
         return np.asarray(self._state.pairs["n_rejected"].sum(axis=1), dtype=np.float64)

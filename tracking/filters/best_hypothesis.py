@@ -1,4 +1,4 @@
-"""Which hypothesis of a bank is reported."""
+"""Choice of the hypothesis of a bank that is reported."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import math
 from tracking.kernels.jit import kernel
 
 LEAST_LEAD = 1e-9
-"""[-] Log-likelihoods that differ by less are equal but for rounding."""
+"""[-] Smaller differences of log-likelihoods are rounding errors."""
 
 
 @kernel
 def choose_best(s, lead):
     """Report the likeliest hypothesis if it leads the reported one by more than `lead`.
 
-    Hypotheses that began as one in several rotations are equally likely at first. The first that
-    leads by more than rounding is reported then, so that their order decides nothing.
+    Hypotheses that start as rotated copies of one are equally likely at first. The first that
+    leads by more than rounding is then reported, so that their order has no effect.
 
     Returns:
-        The likeliest, and whether it is reported only from now on.
+        The likeliest hypothesis, and whether this call chose it for the report.
     """
     group, best, second = s.group[0], -1, -math.inf
     for h in range(s.alive.shape[0]):
@@ -30,7 +30,7 @@ def choose_best(s, lead):
                 second = max(second, s.loglik[h])
     if group.undecided and s.loglik[best] > second + LEAST_LEAD:
         group.undecided, lead = False, -1.0
-    # Only for a clear lead, or hypotheses that are equally likely would take turns.
+    # A clear lead is required: hypotheses that are equally likely would alternate.
     changes = not s.alive[group.best] or s.loglik[best] > s.loglik[group.best] + lead
     if changes:
         group.best = best

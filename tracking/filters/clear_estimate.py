@@ -1,4 +1,4 @@
-"""Estimates of one instant as nothing is known: zeros, absent, no orientation; and who is heard."""
+"""Reset of an estimate of one time, and the check of a node for recent ranges."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from tracking.kernels.jit import small_kernel
 
 @small_kernel
 def is_heard(c, node, t):
-    """True for a node that took part in a range lately: who did long ago has left."""
+    """True if the last range of a node is no older than `node_timeout`; otherwise it has left."""
     return node.seen and t - node.t_last_range <= c.node_timeout
 
 
 @small_kernel
 def clear_estimate(e, o, out):
-    """Forget what an estimate held before.
+    """Set an estimate to zeros, with all pairs absent and no orientations.
 
     Args:
-        e: Environment.
-        o: Time.
+        e: Index of the environment.
+        o: Index of the time.
         out: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...), written.
     """
     pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out

@@ -1,4 +1,4 @@
-"""The first shape of a group and the place of a newcomer, from the first ranges of each pair."""
+"""First ranges of each pair, and the first shape of a group from them by classical MDS."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from tracking.kernels.jit import allocating_kernel, kernel
 
 N_FIRST = 8
-"""Ranges of a pair that are kept until it runs, the newest."""
+"""Number of newest ranges of a pair that are kept until its filter runs."""
 
 
 @kernel
 def collect(c, pair, t, distance, is_survey):
-    """Keep a range of a pair that does not run yet, or a surveyed distance, for good."""
+    """Store a range of a pair that does not run yet, or its surveyed distance permanently."""
     if is_survey:
         pair.surveyed = distance
         return
@@ -27,7 +27,7 @@ def collect(c, pair, t, distance, is_survey):
 
 @kernel
 def is_ready(c, s, layout, i, j, t):
-    """True when a pair has k ranges of a short time, or what came in a longer one is enough."""
+    """True if a pair has k recent ranges, `min_ranges` over a longer time, or is surveyed."""
     pair = s.pairs[layout.pair_index[i, j]]
     if pair.surveyed > 0.0:
         return True
@@ -43,17 +43,17 @@ def is_ready(c, s, layout, i, j, t):
 
 @kernel
 def newest_first(pair):
-    """Time of the newest of a pair's first ranges [s]."""
+    """Return the time of the newest of a pair's first ranges [s]."""
     return pair.start_t[(pair.start_n - 1) % N_FIRST]
 
 
 @allocating_kernel
 def start_distance(c, s, layout, i, j):
-    """Surveyed distance of a pair, or the median of its newest ranges, and how far these scatter.
+    """Return the surveyed distance of a pair, or the median of its newest ranges, and the scatter.
 
-    The median of eight holds against three that are absurd. Ranges of the same `start_max_age`
-    count, three at least; their scatter is 1.5 times the median deviation, which for normal
-    errors is their standard deviation.
+    The median of eight is robust against three outliers. Ranges within `start_max_age` of the
+    newest count, `min_ranges` at least; their scatter is 1.5 times the median absolute deviation,
+    which for normal errors is their standard deviation.
 
     Returns:
         Distance and scatter [m].
@@ -75,15 +75,15 @@ def start_distance(c, s, layout, i, j):
 
 @kernel
 def forget_first(pair):
-    """Begin to collect the first ranges of a pair; a surveyed distance is kept."""
+    """Discard the first ranges of a pair; a surveyed distance is kept."""
     pair.start_n = 0
 
 
 @allocating_kernel
 def choose_members(c, s, layout, members, t):
-    """Nodes of which all pairs are ready, written; returns how many, 0 if too few to start.
+    """Write nodes whose pairs are all ready to `members`; return how many, 0 if too few to start.
 
-    The readiest come first, so that their numbers decide nothing.
+    Nodes with the most ready pairs come first, so that the numbering has no effect.
     """
     n = s.nodes.shape[0]
     rank, order = np.empty(n), np.empty(n, np.int64)
@@ -112,7 +112,7 @@ def choose_members(c, s, layout, members, t):
 
 @kernel
 def readiness(c, s, layout, i, t):
-    """How many pairs of node i are ready; of equals, those are before that are nearer to others."""
+    """Return the number of ready pairs of node i, plus a fraction that falls with its distances."""
     n, way = 0, 0.0
     for k in range(s.nodes.shape[0]):
         if k != i and is_ready(c, s, layout, i, k, t):
@@ -125,7 +125,7 @@ def readiness(c, s, layout, i, t):
 
 @allocating_kernel
 def first_shape(c, s, layout, members, m):
-    """Classical MDS of the first ranges: positions of the members round their centre, (m, 3)."""
+    """Return the positions of the members about their centre by MDS of the first ranges, (m, 3)."""
     D2 = np.zeros((m, m))
     for a in range(m):
         for b in range(m):
@@ -136,10 +136,10 @@ def first_shape(c, s, layout, members, m):
 
 @allocating_kernel
 def classical_mds(D2, d, power):
-    """Positions about their centre, (node, 3), from squared distances D2, (node, node).
+    """Return positions about their centre, (node, 3), from squared distances D2, (node, node).
 
-    ``K = -J D2 J / 2``, its eigenvectors times powers of its eigenvalues: 0.5 reproduces the
-    distances (`tracking.maths.mds`).
+    They are the eigenvectors of ``K = -J D2 J / 2`` times the given power of its eigenvalues: 0.5
+    reproduces the distances (`tracking.maths.mds`).
     """
     n = D2.shape[0]
     J = np.eye(n) - 1.0 / n
@@ -147,7 +147,7 @@ def classical_mds(D2, d, power):
     X = np.zeros((n, 3))
     for k in range(min(d, n)):
         along = E[:, n - 1 - k]
-        # LAPACK's signs differ with machine and numbering; here the longer tail is ahead.
+        # LAPACK's signs differ with machine and numbering: here the sum of cubes is not negative.
         sign = -1.0 if np.sum(along**3) < 0.0 else 1.0
         X[:, k] = sign * along * max(eigenvalues[n - 1 - k], 0.0) ** power
     return X

@@ -1,6 +1,6 @@
-"""Which way a carrier points, and the acceleration of one that stays level.
+"""Heading of a vehicle, and the acceleration of a vehicle that stays level.
 
-The latter is free of the tilt that its orientation errs by.
+This acceleration is free of the tilt error of the orientation.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ GRAVITY = 9.81
 
 @small_kernel
 def direction(w, x, y, z):
-    """Cosine and sine of the yaw of a quaternion q_wb."""
+    """Return cosine and sine of the yaw of a quaternion q_wb."""
     c, s = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
     length = math.sqrt(c * c + s * s)
     return (c / length, s / length) if length > 0.0 else (1.0, 0.0)
@@ -23,7 +23,7 @@ def direction(w, x, y, z):
 
 @small_kernel
 def angle_between(cos_a, sin_a, cos_b, sin_b):
-    """Angle from one direction to another, -pi to pi [rad]; small ones without a library."""
+    """Return the angle from one direction to another, -pi to pi [rad]; small ones by a series."""
     c, s = cos_a * cos_b + sin_a * sin_b, cos_a * sin_b - sin_a * cos_b
     if c > 0.0 and abs(s) < 0.05:
         q = s * s  # arc sine, to 1e-11
@@ -33,22 +33,22 @@ def angle_between(cos_a, sin_a, cos_b, sin_b):
 
 @small_kernel
 def level(w, x, y, z, a0, a1, a2, cos_yaw, sin_yaw):
-    """Horizontal acceleration, the body taken as level.
+    """Return the horizontal acceleration of a body that is assumed to be level.
 
-    The specific force in the body, ``f = R^T (a + g)``, holds no error of the orientation;
-    turned by the yaw alone it is the acceleration of a car or robot on a floor. A tilt error
+    The specific force in the body, ``f = R^T (a + g)``, has no error of the orientation;
+    rotated by the yaw alone it is the acceleration of a car or robot on a floor. A tilt error
     of half a degree would add 0.09 m/s2.
 
     Args:
-        w: Quaternion q_wb.
-        x: Quaternion.
-        y: Quaternion.
-        z: Quaternion.
-        a0: Acceleration, world frame [m/s2].
-        a1: The same.
-        a2: The same.
-        cos_yaw: Of the quaternion's yaw (`direction`).
-        sin_yaw: The same.
+        w: Quaternion q_wb, w.
+        x: Quaternion q_wb, x.
+        y: Quaternion q_wb, y.
+        z: Quaternion q_wb, z.
+        a0: Acceleration along x, world frame [m/s2].
+        a1: Acceleration along y, world frame [m/s2].
+        a2: Acceleration along z, world frame [m/s2].
+        cos_yaw: Cosine of the quaternion's yaw (`direction`).
+        sin_yaw: Sine of the quaternion's yaw.
 
     Returns:
         The two horizontal accelerations, world frame [m/s2].

@@ -1,4 +1,4 @@
-"""What the position filters believe, one set of parameters for each kind of filter."""
+"""Parameters of the position filters, one class for each kind of filter."""
 
 from __future__ import annotations
 

@@ -1,21 +1,21 @@
-"""The sums over a covariance that most of the time goes into: hand-made vectors, or plain loops.
+"""Covariance operations that take most of the time: with SIMD vectors, or in plain loops.
 
-Both give the same up to rounding; the vectors take half the time or less. They are put together
-from instructions of LLVM (`covariance_simd`), which is not for every taste or machine: set
-`RELPOS_SIMD=0` in the environment, before the package is imported, to do without them.
+Both give the same up to rounding; SIMD takes half the time or less. Its code is generated from
+LLVM instructions (`covariance_simd`), which may not suit every machine: set `RELPOS_SIMD=0` in the
+environment, before the package is imported, to use plain loops.
 
     sum_rows(P, h, idx, val, m, W, share, q, w)
-        w = sum_k val_k P[h, idx_k] - sum_k share_k W[h, k]    of m rows of P, q rows of W
+        w = sum_k val_k P[h, idx_k] - sum_k share_k W[h, k]    for m rows of P, q rows of W
     add_to_rows(P, h, p, b, m, F, i)                            P[h] <- F P
-        Position and velocity of node i, which begin at state p, gain what the m states from b on
-        are worth: `F[i, k, r]` is what row r gains by state k, and `F[i, STATES, r]`, the time,
-        what a position gains by its velocity. m is 3 in the plane, 4 or 7 in space.
+        Add to the rows of position and velocity of node i, which begin at state p, those of the m
+        states from b on, times gains: `F[i, k, r]` is the gain of row r by state k, `F[i, STATES,
+        r]`, the time, that of a position by its velocity. m is 3 in the plane, 4 or 7 in space.
     add_to_columns(P, h, p, b, m, F, i)                         P[h] <- P F^T
-        The same for the columns, down to the last row of the velocity.
+        Add to the columns with the same gains, down to the last row of the velocity.
     apply_downdate(P, h, W, g, m, scale)                        P[h] <- D (P - W^T W) D
-        Of m rows of W[g], symmetric to the last bit; D = diag(scale), 1 for None.
+        W is m rows of W[g]; the result is exactly symmetric; D = diag(scale), or 1 for None.
     mirror(P, h, rows)
-        Copy what is right of the diagonal in the first rows of P[h] to below it.
+        Copy the upper triangle of the first rows of P[h] to the lower triangle.
 
 P is (matrix, n, n), W (matrix, row, n), F (node, STATES + 1, ROOM).
 """
@@ -32,7 +32,7 @@ from tracking.maths import covariance_simd as simd
 from tracking.maths.covariance_loops import ROOM, STATES, mirror
 
 USES_SIMD = os.environ.get("RELPOS_SIMD", "1") != "0" and not config.DISABLE_JIT
-"""Whether the sums are in vectors where these are whole."""
+"""True if SIMD is used for matrices of a suitable size."""
 
 
 @small_kernel

@@ -1,16 +1,16 @@
-"""The sums over a covariance that most of the time goes into, in plain loops (`covariance`)."""
+"""Covariance operations that take most of the time, in plain loops (`covariance`)."""
 
 from __future__ import annotations
 
 from tracking.kernels.jit import kernel, small_kernel
 
 STATES, ROOM = 7, 8
-"""States behind position and velocity, at most; numbers of a line of F."""
+"""Largest number of states after position and velocity; length of a row of F."""
 
 
 @kernel
 def sum_rows(P, h, idx, val, m, W, share, q, w):
-    """Write ``sum_k val_k P[h, idx_k] - sum_k share_k W[h, k]`` of m and q rows."""
+    """Write ``sum_k val_k P[h, idx_k] - sum_k share_k W[h, k]``, of m and q rows, to w."""
     w[:] = 0.0
     for k in range(0, m - m % 4, 4):
         v0, v1, v2, v3 = val[k], val[k + 1], val[k + 2], val[k + 3]
@@ -24,14 +24,14 @@ def sum_rows(P, h, idx, val, m, W, share, q, w):
 
 @small_kernel
 def add_row(total, weight, row):
-    """Add a row times a weight."""
+    """Add a row times a weight to the total."""
     for r in range(len(total)):
         total[r] += weight * row[r]
 
 
 @small_kernel
 def take_off(total, weights, rows, m):
-    """Subtract the first m rows times their weights, four at a time: each sweep costs memory."""
+    """Subtract the first m rows times their weights, four per sweep to save memory accesses."""
     for k in range(0, m - m % 4, 4):
         v0, v1, v2, v3 = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
         w0, w1, w2, w3 = rows[k], rows[k + 1], rows[k + 2], rows[k + 3]
@@ -43,7 +43,7 @@ def take_off(total, weights, rows, m):
 
 @kernel
 def add_to_rows(P, h, p, b, m, F, i):
-    """``F P``: the rows of position and velocity of one node."""
+    """Write ``F P``: change the rows of position and velocity of node i."""
     d = 2 if m == 3 else 3
     for r in range(2 * d):
         if r < d:
@@ -55,7 +55,7 @@ def add_to_rows(P, h, p, b, m, F, i):
 
 @kernel
 def add_to_columns(P, h, p, b, m, F, i):
-    """The same for the columns, down to the last row of the velocity."""
+    """Write ``P F^T``: change the columns of node i, down to the last row of its velocity."""
     d = 2 if m == 3 else 3
     for k in range(p + 2 * d):
         row = P[h, k]
@@ -68,7 +68,7 @@ def add_to_columns(P, h, p, b, m, F, i):
 
 @kernel
 def apply_downdate(P, h, W, g, m, scale):
-    """``P[h] - W[g]^T W[g]`` of m rows of W, then rows and columns times `scale` unless None."""
+    """Subtract W[g]^T W[g] of m rows from P[h]; scale rows and columns unless `scale` is None."""
     for r in range(P.shape[2]):
         row = P[h, r]
         take_off(row, W[g, :, r], W[g], m)
@@ -79,7 +79,7 @@ def apply_downdate(P, h, W, g, m, scale):
 
 @kernel
 def mirror(P, h, rows):
-    """Copy what is right of the diagonal in the first rows of ``P[h]`` to below it."""
+    """Copy the upper triangle of the first rows of ``P[h]`` to the lower triangle."""
     for r in range(rows):
         for k in range(r + 1, P.shape[2]):
             P[h, k, r] = P[h, r, k]

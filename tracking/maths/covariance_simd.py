@@ -1,8 +1,8 @@
-"""The sums of `covariance` in vectors, as many numbers at a time as a register holds.
+"""The operations of `covariance` in SIMD vectors, as many elements at a time as a register holds.
 
-A compiler finds vectors along a row by itself, but not that many sums can stay in registers while
-all that belongs to them is added, and not how to transpose a square there. `covariance_loops` has
-the same in plain loops.
+A compiler vectorises along a row by itself, but does not keep many sums in registers while all
+their terms are added, and does not transpose a block there. `covariance_loops` has the same
+operations in plain loops.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from tracking.kernels.processors import has_wide_registers
 from tracking.maths.covariance_loops import STATES
 
 LANES = 8 if has_wide_registers() else 4
-"""Numbers of a vector."""
+"""Number of elements of a vector."""
 LONG, SHORT = 48, 16
-"""Numbers of a row that are summed at a time: as many as registers hold, or few in short rows."""
+"""Elements of a row that are summed at a time: as many as registers hold, or few in short rows."""
 WIDE = 2
-"""Vectors side by side in a square of P: enough sums at a time to hide how long each takes."""
+"""Vectors side by side in a block of P: enough sums at a time to hide the latency of each."""
 SHAPES = ((2, 3), (3, 4), (3, 7))
-"""Dimensions, and states behind position and velocity: the plane, space, space with an offset."""
+"""Dimensions, and states after position and velocity: the plane, space, space with an offset."""
 DOUBLE, INT = ir.DoubleType(), ir.IntType(64)
-CONTRACT = ("contract",)  # products may be added without being rounded before
+CONTRACT = ("contract",)  # allows fused multiply-add
 
 
 def vector():
-    """Its type."""
+    """Return the type of a vector."""
     return ir.VectorType(DOUBLE, LANES)
 
 
 def _places(numbers):
-    """Which of two vectors' numbers make a third."""
+    """Return the mask that shuffles elements of two vectors into a third."""
     return ir.Constant(ir.VectorType(ir.IntType(32), LANES), numbers)
 
 
 def matrix_at(target, builder, kind, array, index):
-    """Where a matrix of an array begins, and how long its rows are."""
+    """Return the address of a matrix of an array, and the length of its rows."""
     a = target.make_array(kind)(target, builder, array)
     _, height, width = cgutils.unpack_tuple(builder, a.shape)
     at = builder.mul(index, builder.mul(height, width))
@@ -46,31 +46,31 @@ def matrix_at(target, builder, kind, array, index):
 
 
 def row_at(builder, matrix, row, below, length):
-    """Where a row begins, `below` rows after another."""
+    """Return the address of the row that is `below` rows after another."""
     return builder.gep(matrix, [builder.mul(builder.add(row, INT(below)), length)])
 
 
 def load(builder, row, at):
-    """A vector, from any address."""
+    """Load a vector from an address that need not be aligned."""
     address = builder.bitcast(builder.gep(row, [at]), vector().as_pointer())
     return builder.load(address, align=8)
 
 
 def store(builder, numbers, row, at):
-    """Write a vector, to any address."""
+    """Store a vector at an address that need not be aligned."""
     address = builder.bitcast(builder.gep(row, [at]), vector().as_pointer())
     builder.store(numbers, address, align=8)
 
 
 def spread(builder, row, at):
-    """A vector of one number, again and again."""
+    """Broadcast one element of a row to a vector."""
     nothing = ir.Constant(vector(), ir.Undefined)
     first = builder.insert_element(nothing, builder.load(builder.gep(row, [at])), INT(0))
     return builder.shuffle_vector(first, nothing, _places([0] * LANES))
 
 
 def transpose(builder, block):
-    """LANES vectors across: halves change places, then halves of halves."""
+    """Transpose a block of LANES vectors: exchange halves, then halves of halves."""
     block, half = list(block), LANES // 2
     while half:
         for i in range(LANES):
@@ -86,7 +86,7 @@ def transpose(builder, block):
 
 @intrinsic
 def sum_rows(context, P, h, idx, val, m, W, share, q, w):
-    """The code of `sum_rows` for at least a short stretch."""
+    """Generate the code of `sum_rows` for rows of at least SHORT elements."""
 
     def generate(target, builder, signature, arguments):
         P, h, idx, val, m, W, share, q, w = arguments
@@ -101,7 +101,7 @@ def sum_rows(context, P, h, idx, val, m, W, share, q, w):
         sums = [cgutils.alloca_once(builder, vector()) for _ in range(LONG // LANES)]
 
         def stretch(column, totals):
-            """All rows of one stretch."""
+            """Sum one stretch of all rows."""
             at = [builder.add(column, INT(LANES * j)) for j in range(len(totals))]
             for total in totals:
                 builder.store(nothing, total)
@@ -123,7 +123,7 @@ def sum_rows(context, P, h, idx, val, m, W, share, q, w):
                 builder.store(changed, total)
 
         def stretches(length):
-            """A row. Its last stretch ends with it: some numbers are summed twice, to the same."""
+            """Sum whole rows. The last stretch ends with the row and may overlap the one before."""
             last, step = builder.sub(n, INT(length)), INT(length)
             with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (column, _):
                 beyond = builder.icmp_signed(">", column, last)
@@ -140,7 +140,7 @@ def sum_rows(context, P, h, idx, val, m, W, share, q, w):
 
 
 def _counts(d, m, r, q):
-    """Whether row r gains anything by state q."""
+    """Return whether row r has a gain by state q."""
     upright, rises = q == 2 and d == 3, r % d == 2
     if m == STATES:
         return rises or not upright
@@ -148,7 +148,7 @@ def _counts(d, m, r, q):
 
 
 def _for_each_shape(builder, m, generate):
-    """The code of every shape; which of it runs is known by the number of states."""
+    """Generate the code of every shape; the number of states selects the one that runs."""
     for d, states in SHAPES:
         with builder.if_then(builder.icmp_signed("==", m, INT(states))):
             generate(d, states)
@@ -160,7 +160,7 @@ def _add_product(builder, total, one, other):
 
 @intrinsic
 def add_to_rows(context, P, h, p, b, m, F, i):
-    """The code of `add_to_rows` for whole vectors."""
+    """Generate the code of `add_to_rows` for rows of whole vectors."""
 
     def generate(target, builder, signature, arguments):
         P, h, p, b, m, F, i = arguments
@@ -195,7 +195,7 @@ def add_to_rows(context, P, h, p, b, m, F, i):
 
 @intrinsic
 def add_to_columns(context, P, h, p, b, m, F, i):
-    """The code of `add_to_columns`. What stands behind them in a vector gains nothing."""
+    """Generate the code of `add_to_columns`; gains of later elements in a vector are zero."""
 
     def generate(target, builder, signature, arguments):
         P, h, p, b, m, F, i = arguments
@@ -230,7 +230,7 @@ def add_to_columns(context, P, h, p, b, m, F, i):
 
 @intrinsic
 def apply_downdate(context, P, h, W, g, m, scale):
-    """The code of `apply_downdate` for whole squares."""
+    """Generate the code of `apply_downdate` for whole blocks."""
     fades = not isinstance(scale, types.NoneType)
 
     def generate(target, builder, signature, arguments):
@@ -242,7 +242,7 @@ def apply_downdate(context, P, h, W, g, m, scale):
         sums = [[cgutils.alloca_once(builder, vector()) for _ in range(WIDE)] for _ in range(LANES)]
 
         def square(row, column, wide):
-            """Take off LANES rows of P, wide vectors of each; the other half follows."""
+            """Downdate `wide` vectors of LANES rows of P; copy the result to the other half."""
             own = [row_at(builder, states, row, i, n) for i in range(LANES)]
             columns = [builder.add(column, INT(LANES * j)) for j in range(wide)]
             each = [(i, j) for i in range(LANES) for j in range(wide)]
@@ -261,7 +261,7 @@ def apply_downdate(context, P, h, W, g, m, scale):
             for j, at in enumerate(columns):
                 block = [builder.load(sums[i][j]) for i in range(LANES)]
                 if fades:
-                    # Of the two first, so that both halves are rounded alike.
+                    # The product of both factors first, so that both halves are rounded alike.
                     both = load(builder, scale, at)
                     block = [
                         builder.fmul(total, builder.fmul(one, both))

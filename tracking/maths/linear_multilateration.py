@@ -1,4 +1,4 @@
-"""A position from distances by linear equations, on both sides of those that are flat."""
+"""Linear multilateration: a position from distances, on both sides of a flat layout."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ import numpy as np
 from tracking.kernels.jit import allocating_kernel
 
 MIN_EXTENT = 0.1
-"""[m] Along an axis of which others extend less, the errors of ranges are all that they tell."""
+"""[m] RMS extent of the known nodes along an axis below which range errors dominate there."""
 
 
 @allocating_kernel
 def place(d, min_spread, merge_distance, known, distance, sides):
-    """Where a node is, from its distances to known ones; both candidates if a mirror fits too.
+    """Write the position of a node from its distances to known ones; two if the side is ambiguous.
 
     Args:
         d: 2 or 3.
-        min_spread: A layout with less extent along an axis does not span it [m].
+        min_spread: RMS extent along an axis up to which a layout does not span it [m].
         merge_distance: A node nearer than this to the plane of the others has no other side [m].
         known: Positions, (known, 3) [m].
         distance: Distances to them, (known) [m].
         sides: The candidates, (2, 3), written.
 
     Returns:
-        1 if the known nodes span the space, 2 if they are too flat to tell the side.
+        Number of candidates: 2 if the known nodes are too flat to determine the side, else 1.
     """
     _, _, extent, _ = main_axes(d, known)
     flat = extent[d - 1] <= min_spread
@@ -34,10 +34,10 @@ def place(d, min_spread, merge_distance, known, distance, sides):
 
 @allocating_kernel
 def sort_sides(d, known, sides):
-    """Put two places that are equally good into an order that no numbering nor rotation changes.
+    """Order two positions that are equally good, independently of numbering and rotation.
 
-    By the sign of the volume of what the others lean to, where between the places they are, and
-    the way from one to the other.
+    The order is the sign of the cross product of their midpoint, from the centre, and their
+    difference; in space, of a triple product with the third moment of the known positions.
     """
     centre, leaning = np.zeros(d), np.zeros(d)
     for a in range(known.shape[0]):
@@ -60,7 +60,7 @@ def sort_sides(d, known, sides):
 
 @allocating_kernel
 def main_axes(d, known):
-    """Centre of positions, what they are from it, extent along their main axes, and the axes.
+    """Return the centre, the positions about it, their extents along the main axes, and the axes.
 
     Extents are root mean squares [m], the longest first; axes are rows.
     """
@@ -74,20 +74,20 @@ def main_axes(d, known):
 
 @allocating_kernel
 def place_across(d, known, distance, axis, sides):
-    """Where a node is by least squares of squared distances, with one axis of the others left open.
+    """Write the position by least squares of squared distances, with one main axis left out.
 
-    On both sides along it, so far away that the distances are right in the mean.
+    There is one on both sides along this axis, where the mean of the squared distances fits.
 
     Args:
         d: 2 or 3.
         known: Positions, (known, 3) [m].
         distance: Distances to them, (known) [m].
-        axis: Which of their main axes is open, the longest first; d for none. Others along which
-            they hardly extend say nothing either.
-        sides: The places, (2, 3), written.
+        axis: Index of the main axis that is left out, the longest first; d for none. Axes shorter
+            than `MIN_EXTENT` are not used either.
+        sides: The positions, (2, 3), written.
 
     Returns:
-        How far from the others the places are along that axis [m].
+        Distance of the positions from the centre along that axis [m].
     """
     m = known.shape[0]
     centre, A, extent, axes = main_axes(d, known)

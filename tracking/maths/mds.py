@@ -6,13 +6,13 @@ With D the matrix of distances and J the centring matrix, the kernel
 
 gives positions X that reproduce D exactly where D is Euclidean in d dimensions, and the best
 rank-d fit of K otherwise [1]. (The text of the paper takes the square root twice.) Distances
-do not see rotations, shifts and mirror images: X is then aligned to positions known otherwise
-by the orthogonal Procrustes problem [2], mirror images included.
+are invariant to rotation, translation and reflection: X is then aligned to known positions by the
+orthogonal Procrustes problem [2], reflections included.
 
-Classical MDS weights every distance alike, and one rotation stands for all it knows of the
-vectors. The weighted form [3] takes relative positions with their covariances: where those are
-certain of lengths only, it is classical MDS with Procrustes to first order. Its compiled form is in
-`tracking.filters.pair.mds_feedback`; this is the plain twin.
+Classical MDS weights every distance alike, and aligns with one rotation for all vectors. The
+weighted form [3] takes relative positions with their covariances: if these are certain of lengths
+only, it is classical MDS with Procrustes to first order. Its compiled form is in
+`tracking.filters.pair.mds_feedback`; this is the reference implementation.
 
 References:
     [1] Torgerson, Psychometrika 17 (1952) 401.
@@ -30,7 +30,7 @@ from tracking.geometry import best_rotation
 
 
 def classical_mds(distance: F64, dimensions: int) -> F64:
-    """Centred positions that reproduce the distances.
+    """Return centred positions that reproduce the distances.
 
     Args:
         distance: Symmetric distances, (node, node) [m].
@@ -50,11 +50,11 @@ def classical_mds(distance: F64, dimensions: int) -> F64:
 
 
 def refine_positions(pos: F64, dimensions: int) -> F64:
-    """Positions with the shape that MDS gives their distances, aligned to themselves.
+    """Return the positions by MDS of the distances, aligned to the relative positions.
 
     Args:
-        pos: Relative position of every ordered pair, p_j - p_i, (node, node, 3) [m]. They
-            need not close around a triangle.
+        pos: Relative position of every ordered pair, p_j - p_i, (node, node, 3) [m]. Their sum
+            around a triangle need not be zero.
         dimensions: 2 or 3.
 
     Returns:
@@ -69,17 +69,17 @@ def refine_positions(pos: F64, dimensions: int) -> F64:
 
 
 def weighted_mds(x: F64, cov: F64, pairs: I64) -> F64:
-    """Least squares over all pairs, by their covariances.
+    """Return the least-squares states of nodes over all pairs, weighted by their covariances.
 
-    The stress ``sum (y_j - y_i - x_ij)^T P_ij^-1 (y_j - y_i - x_ij)`` is least at the result.
+    They minimise the stress ``sum (y_j - y_i - x_ij)^T P_ij^-1 (y_j - y_i - x_ij)``.
 
     Args:
-        x: Difference of what nodes j and i have, (pair, k).
-        cov: Its covariance P, (pair, k, k).
+        x: State of node j minus that of node i, (pair, k).
+        cov: Covariance P of `x`, (pair, k, k).
         pairs: Node indices, (pair, 2).
 
     Returns:
-        What each node has relative to node 0, (node, k).
+        State of each node relative to node 0, (node, k).
     """
     n, k = int(pairs.max()) + 1, x.shape[1]
     B = np.zeros((len(pairs), n))

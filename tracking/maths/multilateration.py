@@ -1,10 +1,10 @@
-"""Where a node is, by its distances to others that are known: the place that fits best.
+"""Robust multilateration: the position of a node that best fits its distances to known nodes.
 
-Least squares of squared distances need no first guess (`first_ranges.place_across`), but are far
-off where the others are nearly in line, or close together; from there, with each of their axes left
-open in turn, the distances themselves are fitted. Obstacles only lengthen ranges, so a distance
-that is too short says more than one that is too long, and none more than a little. The scales of
-that are fields of `c` (`JointStartParams`).
+Least squares of squared distances (`linear_multilateration.place_across`) need no initial guess,
+but err by much if the known nodes are nearly collinear or close together. With each main axis left
+out in turn they give initial positions for a fit of the distances. Obstacles only lengthen ranges,
+so a distance that is too short has a larger loss than one that is too long; losses are bounded.
+Their scales are fields of `c` (`JointStartParams`).
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.maths.linear_multilateration import main_axes, place_across, sort_sides
 
 EQUAL, ON_EDGE = 1e-6, 1e-9
-"""[-, m2] Less than this is rounding: of what distances say, and of on which side a place is."""
+"""[-, m2] Rounding error of a loss, and of the product of two offsets that decides the side."""
 STEPS = 10
-"""[-] Of Gauss and Newton from a first place to the one that fits best."""
+"""[-] Number of Gauss-Newton steps from each initial position."""
 
 
 @small_kernel
 def misfit(c, error):
-    """What an error [m] says against a place."""
+    """Return the bounded squared loss of the error of a distance [m]."""
     scaled = error / (c.long_error if error > 0.0 else c.short_error)
     return min(scaled * scaled, c.largest_loss)
 
 
 @kernel
 def total_loss(c, known, distance, pos):
-    """What distances (other) to known places say against a position."""
+    """Return the total loss of a position over the distances to known positions, (other)."""
     total = 0.0
     for a in range(known.shape[0]):
         squared = 0.0
@@ -41,10 +41,10 @@ def total_loss(c, known, distance, pos):
 
 @allocating_kernel
 def best_position(c, known, distance, pos):
-    """Replace a position by the one that the distances say least against; returns what they say.
+    """Replace a position by the one with the least total loss; return this loss.
 
-    Looked for from where least squares put it, on both sides of the others along each of their
-    axes, from where it is, and from the mirror image of that.
+    The search starts from the least squares solutions on both sides along each main axis of the
+    others, from the given position, and from its mirror image.
     """
     d = c.d
     first = np.zeros((2 * d + 4, 3))
@@ -62,16 +62,16 @@ def best_position(c, known, distance, pos):
 
 @allocating_kernel
 def best_positions(c, known, distance, sides):
-    """The place that distances say least against, and a second if they leave the side open.
+    """Write the position with the least total loss, and a second one if the side is ambiguous.
 
     Args:
         c: Coefficients.
         known: Positions of others, (other, 3) [m].
         distance: Distances to them, (other) [m].
-        sides: Places, the better one first, (2, 3), written.
+        sides: Positions, the better one first, (2, 3), written.
 
     Returns:
-        How many places there are, 1 or 2.
+        Number of positions, 1 or 2.
     """
     d = c.d
     places = np.zeros((2 * d + 2, 3))
@@ -99,7 +99,7 @@ def best_positions(c, known, distance, sides):
 
 @allocating_kernel
 def initial_positions(d, known, distance, places):
-    """Where least squares put a node with each axis of the others left open, and with none.
+    """Write the least squares positions of a node with each main axis left out, and with none.
 
     Args:
         d: 2 or 3.
@@ -113,7 +113,7 @@ def initial_positions(d, known, distance, places):
 
 @allocating_kernel
 def reflected_position(d, known, pos):
-    """Of a position across the line, or plane, that known places are nearest to."""
+    """Reflect a position across the line or plane that fits the known positions best."""
     centre = np.zeros(3)
     for a in range(known.shape[0]):
         centre += known[a] / known.shape[0]
@@ -130,9 +130,9 @@ def reflected_position(d, known, pos):
 
 @allocating_kernel
 def refine(c, known, distance, pos):
-    """Move a position to where the distances fit best; returns what they say against that.
+    """Move a position to the least loss by Gauss-Newton steps; return the total loss there.
 
-    Distances that are far off hardly pull. A step may lead away: the best place passed counts.
+    Distances of the largest loss have a small weight. A step may fail: the best position is kept.
     """
     d = c.d
     best, least = pos.copy(), total_loss(c, known, distance, pos)

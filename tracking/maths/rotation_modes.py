@@ -1,9 +1,9 @@
-"""The peaks of a quadratic function of a matrix, over all rotations and mirror images.
+"""Modes of a quadratic function of a matrix over all rotations and reflections.
 
     f(R) = score . (R - 1) - (R - 1) . information (R - 1) / 2
 
-with the elements of R row by row. Newton's method on the group from many starts, each step a turn
-``exp(w) R``, held back as Levenberg and Marquardt do where a step would lead down.
+with the elements of R row by row. They are found by Newton's method on O(3) from many starts, in
+steps ``exp(w) R`` with Levenberg-Marquardt damping where a step would decrease f.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import numpy as np
 from tracking.kernels.jit import allocating_kernel
 
 STEPS, SMALL = 30, 1e-4
-"""[-, rad] Steps of a climb at most; it ends with one as small as this."""
+"""[-, rad] Largest number of steps of a climb; length of a step below which it ends."""
 
 
 @allocating_kernel
 def climb_to_mode(information, score, R, H):
-    """Move R to the peak above it; returns f there.
+    """Move R uphill to a mode; return f there.
 
     Args:
-        information: (9, 9), symmetric.
-        score: (9).
-        R: Orthogonal, (3, 3), written.
-        H: Negative second derivatives of f by w at the peak, (3, 3), written.
+        information: Information matrix, (9, 9), symmetric.
+        score: Score, (9).
+        R: Orthogonal matrix, (3, 3), written.
+        H: Negative second derivatives of f by w at the mode, (3, 3), written.
     """
     g, w, step = np.zeros(9), np.zeros(3), np.zeros((3, 3))
     value = gain(information, score, R, g)
@@ -60,7 +60,7 @@ def climb_to_mode(information, score, R, H):
 
 @allocating_kernel
 def gain(information, score, R, g):
-    """f(R); writes its derivatives by the elements of R to g."""
+    """Return f(R); write its derivatives by the elements of R to g."""
     value = 0.0
     for k in range(9):
         g[k] = score[k]
@@ -72,13 +72,13 @@ def gain(information, score, R, g):
 
 @allocating_kernel
 def curvature(information, R, g, w, H):
-    """Derivatives of f by a turn: the first into w (3), the second, negative, into H (3, 3)."""
+    """Write the first derivatives of f by a rotation to w (3), the negative second to H (3, 3)."""
     J = np.zeros((3, 9))
     for a in range(3):
         u, v = (a + 1) % 3, (a + 2) % 3
         for q in range(3):
             J[a, 3 * u + q], J[a, 3 * v + q] = -R[v, q], R[u, q]
-    # A turn by w changes R by [w] R + [w]^2 R / 2, and [w]^2 = w w^T - |w|^2.
+    # A rotation by w changes R by [w] R + [w]^2 R / 2, and [w]^2 = w w^T - |w|^2.
     S = g.reshape((3, 3)) @ R.T.copy()
     trace = S[0, 0] + S[1, 1] + S[2, 2]
     w[:] = J @ g
@@ -89,7 +89,7 @@ def curvature(information, R, g, w, H):
 
 @allocating_kernel
 def rotation_exp(w):
-    """The rotation by a vector w [rad], (3, 3): Rodrigues' formula."""
+    """Return the rotation by a vector w [rad], (3, 3), by Rodrigues' formula."""
     angle = math.sqrt(np.sum(w * w))
     first = math.sin(angle) / angle if angle > 1e-9 else 1.0
     second = (1.0 - math.cos(angle)) / (angle * angle) if angle > 1e-9 else 0.5
@@ -106,7 +106,7 @@ def rotation_exp(w):
 
 @allocating_kernel
 def inverse(M, out):
-    """Write the inverse of a symmetric matrix (3, 3) to out; returns its determinant's inverse."""
+    """Write the inverse of a symmetric matrix (3, 3) to out; return that of its determinant."""
     for a in range(3):
         u, v = (a + 1) % 3, (a + 2) % 3
         for b in range(3):
@@ -119,28 +119,28 @@ def inverse(M, out):
 
 @allocating_kernel
 def least_curvature(H):
-    """The least eigenvalue of a symmetric matrix."""
+    """Return the least eigenvalue of a symmetric matrix."""
     return np.linalg.eigvalsh(H)[0]
 
 
 @allocating_kernel
 def is_near(R, other, angle):
-    """True for rotations that are less than an angle [rad] from each other."""
+    """True if two rotations are less than an angle [rad] from each other."""
     return np.sum(R * other) > 1.0 + 2.0 * math.cos(angle)
 
 
 @allocating_kernel
 def find_modes(information, score, starts, apart):
-    """All peaks that are found from the given starts, and f there, the highest first.
+    """Return all modes that are found from the given starts, and f there, the highest first.
 
     Args:
-        information: (9, 9).
-        score: (9).
+        information: Information matrix, (9, 9).
+        score: Score, (9).
         starts: Orthogonal matrices, (start, 3, 3).
-        apart: Peaks that are nearer to each other are one [rad].
+        apart: Angle below which two modes are one [rad].
 
     Returns:
-        Peaks (peak, 3, 3) and values (peak).
+        Modes, (mode, 3, 3), and values of f, (mode).
     """
     turns, values = np.zeros(starts.shape), np.full(len(starts), -np.inf)
     H, n = np.zeros((3, 3)), 0

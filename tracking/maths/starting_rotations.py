@@ -1,4 +1,4 @@
-"""Rotations and mirror images to start from, where none is known to be right."""
+"""Rotations and mirror images of the first hypotheses, if the right one is unknown."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from tracking.arrays import F64
 
 
 def starting_rotations(dimensions: int, n_planar: int) -> F64:
-    """Rotations and mirror images that no layout is far from, (hyp, 3, 3).
+    """Return rotations and their mirror images that cover all rotations, (hyp, 3, 3).
 
-    In the plane, evenly spaced; in space, the 24 rotations of a cube, of which every rotation
-    is within 63 degrees of one.
+    In the plane they are evenly spaced; in space they are the 24 rotations of a cube, and every
+    rotation is within 63 degrees of one of them.
     """
     if dimensions == 2:
         angles = 2.0 * np.pi * np.arange(n_planar) / n_planar

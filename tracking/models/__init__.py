@@ -1,12 +1,12 @@
-"""Measurement models: what a measurement is predicted to be, and its derivatives.
+"""Measurement models: predicted measurements and their derivatives.
 
-One file each, used by all filters. A model is a compiled function of numbers,
+Each model has a file; filters share them. A model is a compiled function of numbers,
 
     z_hat, *derivatives = model(*state, *constants)
 
-with a derivative by each number of the state, in order. Which elements of a filter's state these
-numbers are is the filter's business. `MODELS` lists them; every model in it is held to finite
-differences (`tests/tracking/test_models.py`). Adding one: a file and a line here.
+with a derivative by each number of the state, in order. A filter chooses the elements of its state
+that are these numbers. `MODELS` lists the models; the derivatives of each are compared with finite
+differences (`tests/tracking/test_models.py`). A new model needs a file and a line here.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from tracking.models.zero_velocity import zero_velocity_model
 
 
 class Model(NamedTuple):
-    """A measurement model and what is needed to check it."""
+    """A measurement model and the data of its test."""
 
     function: Callable[..., tuple[float, ...]]
     n_state: int
-    """Its first arguments are the state, one derivative each."""
+    """Number of arguments that are the state, the first ones; each has a derivative."""
     n_constants: int
     noise: str
-    """The parameter that is its standard deviation."""
+    """Name of the parameter that is the standard deviation of its noise."""
 
 
 MODELS: dict[str, Model] = {
@@ -41,6 +41,6 @@ MODELS: dict[str, Model] = {
     "non-holonomic": Model(nonholonomic_model, 5, 4, "VehicleParams.sideways_std"),
     "mean velocity": Model(mean_velocity_model, 1, 1, "VehicleParams.speed_std"),
 }
-"""By name. A surveyed distance is a range between two origins, without bias or lever arm."""
+"""Models by name. A surveyed distance is a range between two origins, without bias or lever arm."""
 
 __all__ = ["MODELS", "Model"]

@@ -1,4 +1,4 @@
-"""Mean velocity of a group: that of things that are carried, 0 with a wide noise.
+"""Mean velocity of a group: a pseudo-measurement of 0 with a large noise.
 
 0 = (1 / m) sum v_i + noise
 """
@@ -10,5 +10,5 @@ from tracking.kernels.jit import small_kernel
 
 @small_kernel
 def mean_velocity_model(v, m):
-    """Predict what one of m nodes adds to the mean velocity [m/s]; derivative by its velocity."""
+    """Predict the part of one of m nodes in the mean velocity [m/s]; derivative by its velocity."""
     return v / m, 1.0 / m

@@ -1,13 +1,13 @@
 """Line of sight of a pair: a hidden Markov chain of two states, LOS and NLOS.
 
-Between two ranges of a pair the state changes with rates a (to NLOS) and b (to LOS), over dt with
+Between two ranges, transitions to NLOS and to LOS have rates a and b, and over dt the probabilities
 
     a / (a + b) (1 - exp(-(a + b) dt)),    b / (a + b) (1 - exp(-(a + b) dt))
 
-The slow range error holds the NLOS bias. So in LOS or NLOS before and after, a range is predicted
-as it is; a transition to NLOS adds a bias, one to LOS takes the slow error away. Bayes' rule over
-the four transitions gives the probability of NLOS; the Gaussian sum is collapsed after each (GPB1
-[1]). The difference of received and first-path power, where it is reported, is evidence of its own.
+The slow range error includes the NLOS bias. So without a transition a range is predicted as it is;
+a transition to NLOS adds a bias, one to LOS removes the slow error. Bayes' rule over the four
+transitions gives the probability of NLOS; the Gaussian sum is collapsed after each (GPB1 [1]). If
+the difference of received and first-path power is reported, it is additional evidence.
 
 References:
     [1] Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation,
@@ -26,7 +26,7 @@ SQRT_2PI = math.sqrt(2.0 * math.pi)
 
 @small_kernel
 def power_evidence(c, gap):
-    """Log-likelihood ratio of NLOS against LOS, of a power difference [dB]."""
+    """Return the log-likelihood ratio of NLOS against LOS for a power difference [dB]."""
     los = max(gap - c.power_diff_los, 0.0) / c.power_diff_los_std
     nlos = min(gap - c.power_diff_nlos, 0.0) / c.power_diff_nlos_std
     ratio = 0.5 * (los * los - nlos * nlos) - math.log(c.power_diff_nlos_std / c.power_diff_los_std)
@@ -35,7 +35,7 @@ def power_evidence(c, gap):
 
 @small_kernel
 def transition_probs(los_to_nlos_rate, nlos_to_los_rate, dt):
-    """Probabilities of a transition to NLOS and to LOS over dt [s]."""
+    """Return the probabilities of a transition to NLOS and to LOS over dt [s]."""
     changes = (1.0 - exponential(-(los_to_nlos_rate + nlos_to_los_rate) * dt)) / (
         los_to_nlos_rate + nlos_to_los_rate
     )
@@ -44,7 +44,7 @@ def transition_probs(los_to_nlos_rate, nlos_to_los_rate, dt):
 
 @small_kernel
 def nlos_posterior(c, before, enter, leave, los_like, enter_like, leave_like, nlos_like, odds):
-    """Bayes' rule over the four transitions.
+    """Apply Bayes' rule to the four transitions.
 
     Args:
         c: Coefficients.
@@ -55,12 +55,12 @@ def nlos_posterior(c, before, enter, leave, los_like, enter_like, leave_like, nl
         enter_like: Likelihood after a transition to NLOS.
         leave_like: Likelihood after a transition to LOS.
         nlos_like: Likelihood, NLOS before and after.
-        odds: Likelihood ratio of the powers.
+        odds: Likelihood ratio of NLOS against LOS from the powers.
 
     Returns:
-        Probability of NLOS; of a transition; likelihood of the range and its powers; likelihood of
-        the range alone, as the powers say nothing about where nodes are. Where nothing is likely,
-        the probability is as before and the others are 0.
+        Probability of NLOS; probability of a transition; likelihood of the range and its powers;
+        likelihood of the range alone, as powers have no information on positions. If the total
+        likelihood is below 1e-300, the probability is that before and the others are 0.
     """
     los_los = (1.0 - before) * (1.0 - enter) * los_like
     los_nlos = (1.0 - before) * enter * enter_like * odds
@@ -76,5 +76,5 @@ def nlos_posterior(c, before, enter, leave, los_like, enter_like, leave_like, nl
 
 @small_kernel
 def outlier_density(c):
-    """Likelihood of a range that means nothing, in the scale of `likelihood`."""
+    """Return the likelihood of a range that is an outlier, in the scale of `likelihood`."""
     return SQRT_2PI * c.outlier_prob / c.outlier_span

@@ -3,9 +3,9 @@
     0 = -sin(yaw) v_0 + cos(yaw) v_1 - l w + k w f^2 + noise
     f = cos(yaw) v_0 + sin(yaw) v_1 + m w
 
-with l how far the tracker is ahead of the axle, m how far to the left of its middle, w the yaw
-rate, f the speed of the axle forward and k the slip: tyres need a slip angle for the force that a
-curve takes, so the axle drifts outwards [1].
+with l the distance of the tracker ahead of the axle, m that to the left of its middle, w the yaw
+rate, f the forward speed of the axle and k the slip: tyres need a slip angle for the cornering
+force, so the axle drifts outwards [1].
 
 References:
     [1] Rajamani, Vehicle Dynamics and Control, 2nd ed., Springer 2012, section 2.3.
@@ -18,21 +18,21 @@ from tracking.kernels.jit import small_kernel
 
 @small_kernel
 def nonholonomic_model(v0, v1, error, ahead, slip, cos_yaw, sin_yaw, yaw_rate, aside):
-    """Predict the sideways velocity of the axle without its slip, which is 0 [m/s].
+    """Predict the sideways velocity of the axle without its slip [m/s]. The measurement is 0.
 
     Args:
-        v0: Velocity [m/s].
-        v1: Velocity [m/s].
-        error: Heading error, a part of the yaw already: for derivatives alone [rad].
-        ahead: How far the tracker is ahead of the axle [m].
-        slip: [s2/m]
+        v0: Velocity along x [m/s].
+        v1: Velocity along y [m/s].
+        error: Heading error, which the yaw includes; it has a derivative only [rad].
+        ahead: Distance of the tracker ahead of the axle [m].
+        slip: Slip k [s2/m].
         cos_yaw: Cosine of the yaw.
-        sin_yaw: Its sine.
-        yaw_rate: [rad/s]
-        aside: How far the tracker is left of the middle of the axle [m].
+        sin_yaw: Sine of the yaw.
+        yaw_rate: Yaw rate [rad/s].
+        aside: Distance of the tracker to the left of the middle of the axle [m].
 
     Returns:
-        The prediction, and derivatives by the first five.
+        The prediction, and its derivatives by the first five arguments.
     """
     sideways, along = -sin_yaw * v0 + cos_yaw * v1, cos_yaw * v0 + sin_yaw * v1
     forward = along + aside * yaw_rate

@@ -12,7 +12,7 @@ import math
 from tracking.kernels.jit import small_kernel
 
 MIN_DISTANCE = 0.01
-"""[m] Closer than this a direction has no meaning."""
+"""[m] Least distance by which the direction is normalised."""
 
 
 @small_kernel

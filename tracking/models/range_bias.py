@@ -3,8 +3,8 @@
     z = e_fast + e_slow,    dz/de = 1
     e <- k e + (1 - k) m,    k = exp(-s / length),    P <- k^2 P + (1 - k^2) var
 
-with s the distance that both ends have travelled since, and m and var the mean and variance that
-it tends to: 0 in sight, the NLOS bias behind an obstacle (`nlos`).
+with s the distance that both ends have travelled meanwhile, and m and var the mean and variance
+that e tends to: m is 0 in LOS and the NLOS bias in NLOS (`nlos`).
 """
 
 from __future__ import annotations
@@ -20,5 +20,5 @@ def range_bias_model(fast, slow):
 
 @small_kernel
 def slow_error_var(slow_var, nlos_prob, bias, bias_var):
-    """Variance of a slow error that may be an NLOS bias, the mixture taken for a Gaussian [m2]."""
+    """Return the variance of the mixture of a slow error with and without an NLOS bias [m2]."""
     return slow_var + nlos_prob * bias_var + nlos_prob * (1.0 - nlos_prob) * bias * bias

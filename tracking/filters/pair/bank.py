@@ -17,7 +17,7 @@ from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 @small_kernel
 def refine_group(c, s, layout, work):
-    """Move every hypothesis to its weighted MDS: positions, velocities and range errors."""
+    """Set every hypothesis to its weighted MDS: positions, velocities and range errors."""
     n, size = s.nodes.shape[0], 2 * c.d
     m = 0
     for i in range(n):
@@ -50,7 +50,7 @@ def refine_group(c, s, layout, work):
 
 @allocating_kernel
 def degeneracy_ratio(c, s, layout):
-    """Extent of the reported layout across itself over its standard deviation."""
+    """Return the least extent of the reported layout over its standard deviation [-]."""
     h, d, n = s.group[0].best, c.d, s.nodes.shape[0]
     pos = np.zeros((n, 3))
     hypothesis_positions(s, layout, h, pos)
@@ -63,7 +63,7 @@ def degeneracy_ratio(c, s, layout):
         return np.inf
     flat = pos[:, :d].copy()
     eigenvalues, E = np.linalg.eigh(flat.T.copy() @ flat)
-    # Variance across the layout: half of a pair's is each end's. Pairs that are heard decide.
+    # Variance along the shortest axis: each end has half of a pair's. Certain pairs count most.
     information = 0.0
     for p in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
@@ -79,7 +79,7 @@ def degeneracy_ratio(c, s, layout):
 
 @kernel
 def monitor_reflection(c, s, layout):
-    """Bring the mirror image up where it can no longer be excluded."""
+    """Add the mirror image of a layout that was degenerate or fits its ranges badly."""
     group = s.group[0]
     if group.n_alive != 1:
         return
@@ -96,9 +96,9 @@ def monitor_reflection(c, s, layout):
 
 @allocating_kernel
 def add_mirror_image(c, s, layout):
-    """Make the mirror image of the reported hypothesis one, if the bank has room.
+    """Add the mirror image of the reported hypothesis to the bank, if it has room.
 
-    It is mirrored across the line or plane that the layout is nearest to.
+    The layout is reflected across the line or plane that fits it best.
     """
     h = s.group[0].best
     target = copy_hypothesis(s, h)
@@ -148,10 +148,10 @@ def prune_bank(c, s):
 
 @kernel
 def are_same(c, s, a, b):
-    """True when two hypotheses agree in position and velocity of every pair.
+    """True if two hypotheses agree in position and velocity of every pair.
 
-    Velocities count over one second: a layout and its mirror image may meet in a line, but
-    they go on to different sides.
+    Velocities count over one second: a layout and its mirror image may coincide in a line, but
+    their velocities differ.
     """
     for p in range(s.pairs.shape[0]):
         if s.nodes[s.pairs[p].i].present and s.nodes[s.pairs[p].j].present:
@@ -187,7 +187,7 @@ def remove_node(c, s, layout, i, t):
 
 @kernel
 def drop_timed_out(c, s, layout, t):
-    """Remove the nodes that were not heard for so long that they must have left."""
+    """Remove the nodes whose last range is older than `node_timeout`."""
     for i in range(s.nodes.shape[0]):
         if (s.nodes[i].present or s.nodes[i].seen) and t - s.nodes[i].t_last_range > c.node_timeout:
             remove_node(c, s, layout, i, t)

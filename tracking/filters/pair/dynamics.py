@@ -1,9 +1,8 @@
 """The Kalman filter of one pair: prediction and scalar corrections, in place.
 
-State ``x = (pos_ij, vel_ij, e)``, seven numbers, and covariance ``P``, of pair p in hypothesis h;
-e is the slow error of the pair's ranges, which kernels also do without. In two dimensions the
-vertical rows stay exactly zero: nothing is uncertain across the plane. Arrays are indexed inside
-the kernels, since handing on slices costs more than the algebra.
+State ``x = (pos_ij, vel_ij, e)`` and covariance ``P`` of pair p in hypothesis h; e is the slow
+error of the pair's ranges, and optional. In two dimensions the vertical rows stay exactly zero.
+Arrays are indexed inside the kernels, since passing slices costs more than the algebra.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from tracking.models.range import range_model
 
 @small_kernel
 def predict(x, P, p, h, dt, a0, a1, a2, psd, d):
-    """Dead reckoning over dt [s] with a constant relative acceleration a0 a1 a2 [m/s2].
+    """Predict a pair over dt [s] with a constant relative acceleration a0 a1 a2 [m/s2].
 
     ``pos += dt vel + dt^2/2 a``, ``vel += dt a`` and
     ``P = F P F^T + W (psd^2 / dt) W^T`` with ``W = (dt^2/2, dt)`` per axis, [1] eq. 8-9.
@@ -56,10 +55,10 @@ def predict(x, P, p, h, dt, a0, a1, a2, psd, d):
 
 @small_kernel
 def correct(x, P, p, h, work, nu, R):
-    """Scalar Kalman update with innovation nu; returns its variance S.
+    """Apply a scalar Kalman update with innovation nu; return its variance S.
 
     With the optimal gain ``K = PH / S`` the Joseph form reduces to ``P - K (PH)^T``. One
-    triangle is computed and mirrored, so that P stays symmetric to the last bit.
+    triangle is computed and copied to the other, so that P stays exactly symmetric.
 
     Args:
         x: States.
@@ -92,9 +91,9 @@ def correct(x, P, p, h, work, nu, R):
 
 @small_kernel
 def predict_range(x, p, h, l0, l1, l2, work):
-    """Range between two antennas, its slow error included; its Jacobian to row 0 of work.
+    """Return the range between two antennas with its slow error; write H to row 0 of work.
 
-    ``l0 l1 l2`` is the antenna's offset on j minus that on i, world frame [m].
+    ``l0 l1 l2`` is the antenna offset of j minus that of i, world frame [m].
     """
     distance, u0, u1, u2 = range_model(x[p, h, 0] + l0, x[p, h, 1] + l1, x[p, h, 2] + l2)
     work[0, 0], work[0, 1], work[0, 2] = u0, u1, u2

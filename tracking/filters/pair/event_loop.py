@@ -1,4 +1,4 @@
-"""The loop over events: one pass in time order, estimates written where they are due."""
+"""Event loop: one pass in time order, which writes the estimates when they are due."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 from tracking.measurements import ACCEL_NOISE
 from tracking.models.nlos import power_evidence
 
-# Plain numbers of `Kind` and `Status`: kernels do not know enums.
+# Integer values of `Kind` and `Status`, since kernels cannot use enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 ABSENT, STARTING, AMBIGUOUS, OK, LOST = 0, 1, 2, 3, 4
 
 
 class Workspace(NamedTuple):
-    """Room for intermediate results, so that no event allocates."""
+    """Preallocated arrays for intermediate results."""
 
     work: np.ndarray
     """Jacobian and its product with P, (2, 7)."""
@@ -54,16 +54,16 @@ class Workspace(NamedTuple):
     W: np.ndarray
     """Weights of the MDS, (pair, 6, 6)."""
     A: np.ndarray
-    """Its normal equations, (6 node, 6 node)."""
+    """Normal equations of the MDS, (6 node, 6 node)."""
     y: np.ndarray
-    """Right side, then the solution, (6 node)."""
+    """Right-hand side of the MDS, then its solution, (6 node)."""
     nu: np.ndarray
-    """(6)"""
+    """Change of position and velocity of a pair by the MDS, (6)."""
 
 
 @allocating_kernel
 def run_events(coefficients, layout, state, block, t_out, out):
-    """Handle the events of every environment in order.
+    """Process the events of every environment in order.
 
     Args:
         coefficients: Constants (`make_coefficients`), (1).
@@ -72,7 +72,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
         block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;
             (env, event, ...).
         t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
-            holds every event up to its time, that time included.
+            includes every event up to and including its time.
         out: Arrays written: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...).
     """
     t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
@@ -138,7 +138,7 @@ def run_events(coefficients, layout, state, block, t_out, out):
 
 @small_kernel
 def process_attitude(c, s, layout, i, t, values, e, k):
-    """A new orientation and acceleration of node i, held until the next."""
+    """Predict the pairs of node i to time t, then hold its new orientation and acceleration."""
     node = s.nodes[i]
     if node.present:
         for other in range(s.nodes.shape[0]):
@@ -159,7 +159,7 @@ def process_attitude(c, s, layout, i, t, values, e, k):
 
 @small_kernel
 def process_range(s, layout, i, j, t):
-    """Note that i and j were heard; returns their pair and whether its filters run."""
+    """Record a range of nodes i and j; return their pair and whether its filters run."""
     node_i, node_j = s.nodes[i], s.nodes[j]
     node_i.seen, node_j.seen = True, True
     node_i.t_last_range, node_j.t_last_range = t, t
@@ -168,7 +168,7 @@ def process_range(s, layout, i, j, t):
 
 @small_kernel
 def update_range(c, s, layout, work, p, a_i, a_j, t, distance, evidence, is_survey):
-    """A range or survey of a running pair."""
+    """Update a running pair with a range or surveyed distance; refine the group if it is due."""
     group = s.group[0]
     advance_pair(c, s, p, t)
     if is_survey:
@@ -189,11 +189,11 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, evidence, is_surv
 
 @kernel
 def collect_initial_range(c, s, layout, i, j, p, t, distance, is_survey):
-    """A range or survey of a pair that does not run yet, i < j."""
+    """Collect a range or surveyed distance of a pair without filters, i < j; start or join."""
     collect(c, s.pairs[p], t, distance, is_survey)
     if not s.group[0].started:
         try_start(c, s, layout, t)
-        # Three nodes in space are their own mirror image: room for both sides of a fourth.
+        # Three nodes in space equal their mirror image: merging makes room for both sides of a 4th.
         prune_bank(c, s)
         return
     if not s.nodes[i].present:
@@ -204,7 +204,7 @@ def collect_initial_range(c, s, layout, i, j, p, t, distance, is_survey):
 
 @kernel
 def supervise(c, s, layout, t):
-    """From time to time: who left, and which hypotheses are still worth their time."""
+    """Drop nodes that timed out and unlikely hypotheses; with MDS, monitor the reflection."""
     drop_timed_out(c, s, layout, t)
     prune_bank(c, s)
     if c.use_mds:
@@ -214,13 +214,13 @@ def supervise(c, s, layout, t):
 
 @small_kernel
 def is_lost(c, pair, age):
-    """True if a pair had no range that meant anything for longer than it usually takes."""
+    """True if the age [s] of the last range of a pair that was no outlier is above its limit."""
     return age > max(c.lost_after, c.missed_intervals * pair.interval)
 
 
 @allocating_kernel
 def write_estimate(c, s, t, e, o, out):
-    """The best hypothesis at time t, without touching the state."""
+    """Write the best hypothesis, predicted to time t; the state does not change."""
     clear_estimate(e, o, out)
     pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out
     h = s.group[0].best

@@ -6,7 +6,7 @@ of the inputs alone and is reported from them; its covariance is the constant su
 orientation noises ([1] eq. 8-9, `docs/explanation/tracker.md`).
 
     predict     pos += dt vel + dt^2/2 (a_j - a_i),  vel += dt (a_j - a_i)
-    correct     z = range,  h = |pos| + its slow error
+    correct     z = range,  h = |pos| + slow range error
     refine      pos <- MDS of all |pos|, aligned to pos         (`ekf-mds` only)
 
 References:
@@ -43,7 +43,7 @@ class PairEkf(BatchedFilter):
     ) -> None:
         self._coefficients = make_coefficients(constellation, params, use_mds=use_mds)
         self._layout = make_layout(constellation, params)
-        # Room for both sides of a newcomer in every rotation.
+        # Room for both sides of a joining node in every rotation.
         room = 2 * len(self._layout.rotations)
         state, blank = (make_state(constellation, params, n, room) for n in (n_envs, 1))
         super().__init__(constellation, state, blank)

@@ -1,9 +1,9 @@
-"""Starting a group and joining it: from the first k ranges of each pair to running filters.
+"""Initialisation of a group and of joining nodes, from the first ranges of each pair.
 
-A group starts with MDS on the mean of the first k ranges, once for every rotation and mirror
-image of the bank. A node that joins is placed by least squares on its distances to the nodes
-that run already, in every hypothesis; where those are too few or too flat to tell on which
-side it is, both sides become hypotheses. Velocities start at zero and P at the identity.
+A group starts with MDS on the medians of the first ranges, once for every rotation and mirror
+image of the bank. A joining node is placed by least squares on its distances to the present
+nodes, in every hypothesis; if these are too few or too flat to determine its side, both sides
+become hypotheses. Velocities start at zero and P at the identity.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tracking.maths.linear_multilateration import place
 
 @kernel
 def initialise_pair(c, s, h, p, pos, t):
-    """Put a new filter at a relative position: v = 0, P = 1."""
+    """Initialise the filter of pair p at a relative position, with v = 0 and P = I."""
     pair = s.pairs[p]
     both_static = s.nodes[pair.i].static and s.nodes[pair.j].static
     s.x[p, h, :] = 0.0
@@ -46,7 +46,7 @@ def initialise_pair(c, s, h, p, pos, t):
 
 @kernel
 def forget_mean(c, s, t):
-    """The mean velocity of another group is not known, and what came before t changed none."""
+    """Reset the mean velocity and its sums at time t, since the members of the group change."""
     s.group[0].dv0, s.group[0].dv1 = 0.0, 0.0
     for i in range(s.nodes.shape[0]):
         s.nodes[i].t_sum = t
@@ -89,7 +89,7 @@ def try_start(c, s, layout, t):
 
 @kernel
 def hypothesis_positions(s, layout, h, pos):
-    """Positions of the present nodes in one hypothesis, relative to their centre (node, 3)."""
+    """Write the positions of the present nodes in hypothesis h about their centre, (node, 3)."""
     n = pos.shape[0]
     n_present = 0
     for i in range(n):
@@ -106,7 +106,7 @@ def hypothesis_positions(s, layout, h, pos):
 
 @allocating_kernel
 def try_join(c, s, layout, new, t):
-    """Take a node in once it is ready with enough of the others."""
+    """Add a node to the group once its pairs with enough of the others are ready."""
     n = s.nodes.shape[0]
     n_present, n_ready = 0, 0
     ready = np.empty(n, np.int64)
@@ -145,7 +145,7 @@ def try_join(c, s, layout, new, t):
 
 @allocating_kernel
 def copy_hypothesis(s, h):
-    """A copy of a hypothesis in a free place of the bank; -1 if there is none."""
+    """Copy a hypothesis to a free slot of the bank; return the slot, -1 if there is none."""
     for free in range(s.alive.shape[0]):
         if not s.alive[free]:
             s.alive[free] = True

@@ -6,10 +6,10 @@ Positions and velocities y_i of the nodes minimise the stress
 
 with the state x_ij and covariance P_ij of the pair's filter. Along the line of sight this is
 the stress of weighted multidimensional scaling, ``w_ij (|p_j - p_i| - d_ij)^2`` to first order
-[1], with the weight that the filter's range deserves; a pair out of sight is uncertain along
-its line and follows the others. Across the line it is what Procrustes does, alignment to the
-filters' own vectors, by how sure each of them is: so a layout as flat as a line needs no
-exception. The stress is quadratic; its normal equations are solved by a Cholesky factor.
+[1], weighted by the certainty of the filter's range; an NLOS pair is uncertain along its line
+and follows the others. Across the line it is an alignment to the filters' own vectors, as by
+Procrustes, weighted by their certainty: so a layout as flat as a line needs no exception. The
+stress is quadratic; its normal equations are solved by a Cholesky factor.
 
 References:
     [1] De Leeuw, Heiser, Multidimensional scaling with restrictions on the configuration, in
@@ -23,22 +23,22 @@ import math
 from tracking.kernels.jit import small_kernel
 
 LEAST_VAR = 1e-6
-"""[m2], [m2/s2] Added to every variance: surveyed pairs of fixed nodes are as good as exact."""
+"""[m2], [m2/s2] Added to every variance, since surveyed pairs of static nodes are nearly exact."""
 
 
 @small_kernel
 def at(k, d):
-    """Place of the k-th of 2 d coordinates in the state of a pair."""
+    """Return the index of the k-th of 2 d coordinates in the state of a pair."""
     return k if k < d else 3 + k - d
 
 
 @small_kernel
 def invert(L, W, m):
-    """Inverse of a positive definite matrix.
+    """Invert a symmetric positive definite matrix.
 
     Args:
-        L: The matrix, (m, m) in its corner; its lower triangle becomes the Cholesky factor.
-        W: The inverse, written, (m, m) in its corner.
+        L: Matrix, its first m rows and columns; the Cholesky factor is written to its lower half.
+        W: Inverse, written to the first m rows and columns.
         m: Size.
     """
     factor(L, m)
@@ -62,7 +62,7 @@ def invert(L, W, m):
 
 @small_kernel
 def factor(L, m):
-    """Cholesky factor of a symmetric positive definite matrix, in its lower triangle."""
+    """Write the Cholesky factor of a symmetric positive definite matrix to its lower triangle."""
     for k in range(m):
         for r in range(k, m):
             s = L[r, k]
@@ -91,7 +91,7 @@ def solve(L, b, m):
 
 @small_kernel
 def weigh(P, p, h, d, L, W):
-    """Weight of pair p in hypothesis h: the inverse of its covariance, (2 d, 2 d)."""
+    """Write the weight of pair p in hypothesis h, the inverse of its covariance, to W[p]."""
     m = 2 * d
     for r in range(m):
         for k in range(m):
@@ -120,10 +120,10 @@ def add_pair(x, p, h, d, W, a, b, A, y):
 
 @small_kernel
 def move_pair(x, P, p, h, d, W, a, b, y, nu):
-    """Put the filter of pair p where the solution has it; its range error follows.
+    """Set position and velocity of pair p to the MDS solution; its range error follows.
 
-    The rest of the state moves by its regression on what was moved, ``P_ey P_yy^-1 nu``. The
-    covariance stays: the solution holds little that the filters of the group did not know.
+    The range error changes by its regression on that change, ``P_ey P_yy^-1 nu``. The covariance
+    stays: the solution adds little information to the filters of the group.
     """
     m = 2 * d
     for r in range(m):

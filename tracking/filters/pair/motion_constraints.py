@@ -1,15 +1,15 @@
-"""What is known of cars: their rear axle moves sideways by the slip of its tyres only.
+"""Non-holonomic constraint of cars: the rear axle moves sideways by the slip of its tyres only.
 
-The pair filters hold differences of velocities, a wheel speaks of the velocity itself. So each
-hypothesis also holds the mean velocity of the group, u, dead reckoned with the mean of all
-accelerations. With n the direction to the left of car i, l how far the tracker is ahead of the
-axle, k the slip, f the speed of the axle forward and w the yaw rate,
+The pair filters estimate relative velocities, but a wheel constrains the velocity itself. So each
+hypothesis also has the mean velocity of the group, u, dead reckoned with the mean of all
+accelerations. With n the direction to the left of car i, l the distance of the tracker ahead of
+the axle, k the slip, f the forward speed of the axle and w the yaw rate,
 
     n . v_i = (l - k f^2) w,    v_i = u + mean over k of v_ki
 
-corrects u, and every pair of i by its own covariance: the variance of the innovation is that
-of u and of the velocity in the group together, so each takes its share. Of a pair, i has a
-half, or what its own variance allows where the other end is known far less, as after a join.
+corrects u, and every pair of i by its own covariance: the variance of the innovation is the sum
+of those of u and of the velocity in the group, so each is corrected by its share. Car i has half
+of the covariance of a pair, or less if the other end is far less certain, as after a join.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tracking.models.nonholonomic import nonholonomic_model
 
 @small_kernel
 def note_heading(c, node, t, q):
-    """Yaw of a node, and its low-passed rate."""
+    """Update the yaw of a node and its low-passed rate."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     yaw = math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
     dt = t - node.t_state
@@ -37,7 +37,7 @@ def note_heading(c, node, t, q):
 
 @small_kernel
 def add_mean_velocity(c, s, i, t):
-    """Sum what the acceleration of node i adds to the mean velocity until time t."""
+    """Integrate the acceleration of node i up to time t for the mean velocity."""
     node = s.nodes[i]
     dt = t - node.t_sum
     node.t_sum = t
@@ -48,7 +48,7 @@ def add_mean_velocity(c, s, i, t):
 
 @small_kernel
 def velocity_in_group(s, layout, h, i, m):
-    """Horizontal velocity of node i relative to the mean of the m nodes present [m/s]."""
+    """Return the horizontal velocity of node i relative to the mean of m present nodes [m/s]."""
     v0, v1 = 0.0, 0.0
     for k in range(s.nodes.shape[0]):
         if k != i and s.nodes[k].present:
@@ -61,7 +61,7 @@ def velocity_in_group(s, layout, h, i, m):
 
 @small_kernel
 def apply_motion_constraints(c, s, layout, t, work):
-    """Use what is known of the wheels in every hypothesis."""
+    """Predict the mean velocity of every hypothesis and correct it with every car."""
     group = s.group[0]
     dt = t - group.t_wheels
     group.t_wheels = t
@@ -95,7 +95,7 @@ def apply_motion_constraints(c, s, layout, t, work):
 
 @small_kernel
 def hold(c, s, layout, h, i, m, work):
-    """The rear axle of car i moves sideways by the slip of its tyres only."""
+    """Correct hypothesis h with the non-holonomic constraint of car i."""
     node, u, Pu = s.nodes[i], s.mean_v[h], s.mean_cov[h]
     n0, n1 = -math.sin(node.yaw), math.cos(node.yaw)
     r0, r1 = velocity_in_group(s, layout, h, i, m)
@@ -103,9 +103,9 @@ def hold(c, s, layout, h, i, m, work):
         u[0] + r0, u[1] + r1, 0.0, node.ahead, node.slip, n1, -n0, node.yaw_rate, node.aside
     )
     nu = -predicted
-    # What is unknown of the mount has no states here: it is noise.
+    # Errors of the mount have no states here: they are noise.
     unknown = by_ahead * by_ahead * node.ahead_var + by_slip * by_slip * node.slip_var
-    # Variance of the velocity in the group: half of that of a pair is each end's.
+    # Variance of the velocity in the group: each end has half of that of a pair.
     own = 0.0
     for k in range(s.nodes.shape[0]):
         if k != i and s.nodes[k].present:
@@ -117,7 +117,7 @@ def hold(c, s, layout, h, i, m, work):
     nis = nu * nu / S
     s.loglik[h] -= 0.5 * (min(nis, c.nis_cap) + math.log(S))
     if nis > c.jolt_nis:
-        S *= nis / c.jolt_nis  # a jolt or a skid: it counts for less
+        S *= nis / c.jolt_nis  # a jolt or a skid has less weight
     for k in range(s.nodes.shape[0]):
         if k == i or not s.nodes[k].present:
             continue
@@ -139,28 +139,28 @@ def hold(c, s, layout, h, i, m, work):
 
 @small_kernel
 def velocity_variance(P, p, h, n0, n1):
-    """Variance of the relative velocity of pair p along the unit vector n0 n1 [m2/s2]."""
+    """Return the variance of the velocity of pair p along the unit vector n0 n1 [m2/s2]."""
     return n0 * n0 * P[p, h, 3, 3] + n1 * n1 * P[p, h, 4, 4] + 2.0 * n0 * n1 * P[p, h, 3, 4]
 
 
 @small_kernel
 def own_share(pair, own):
-    """Share of a pair's covariance that is the node's own: a half, or less [-].
+    """Return the share of a node in the covariance of a pair: a half, or less [-].
 
     No covariance of two quantities is above the root of the product of their variances. So a
     node whose velocity in the group has variance `own` has a share of at most
-    ``sqrt(own / pair)`` in a pair of variance `pair`: what a node that has just joined does not
-    know about itself is not the uncertainty of those that were there.
+    ``sqrt(own / pair)`` in a pair of variance `pair`: the uncertainty of a node that has just
+    joined does not count as that of the others.
     """
     return 0.5 if pair <= 4.0 * own else math.sqrt(own / pair)
 
 
 @small_kernel
 def correct_share(x, P, p, h, work, nu, S, share):
-    """Correct a pair with an innovation of variance S of which one end's share is its own.
+    """Correct a pair with an innovation of variance S that concerns one of its ends.
 
-    One end has the share a of the pair's covariance, so the gain is ``a P H / S``; the
-    covariance falls by ``a^2 P H H^T P / S``, the rest, the other end's, stays. It stays
+    This end has the share a of the pair's covariance, so the gain is ``a P H / S``; the
+    covariance falls by ``a^2 P H H^T P / S``, and the part of the other end stays. P stays
     positive definite as long as ``a^2 H^T P H < S``.
     """
     m = x.shape[2]

@@ -1,11 +1,10 @@
-"""Whether a range was line of sight, and what its lasting error does meanwhile.
+"""NLOS probability of a pair, and its effect on the slow range error.
 
-A pair is in sight or not, a Markov chain of two states. The state e of its filter is the part
-of the range's error that lasts; behind an obstacle it holds the excess as well. So in sight
-before and after, or in neither, a range is predicted as it is; entering adds an excess
-``N(m, s^2)``, leaving takes e away. Bayes' rule with the innovation and with the gap between
-received and first-path power gives the probability of no sight, and e is forgotten by the
-probability that the sight changed. A few ranges mean nothing and fit neither case.
+LOS and NLOS are the states of a Markov chain. The state e of the pair's filter is the slow
+range error, which includes the bias in NLOS. So without a transition a range is predicted as it
+is; a transition to NLOS adds a bias ``N(m, s^2)``, one to LOS removes e. Bayes' rule with the
+innovation and the difference of received and first-path power gives the probability of NLOS,
+and e is reset by the probability of a transition. Outliers fit neither state.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ from tracking.models.nlos import nlos_posterior, outlier_density, transition_pro
 from tracking.models.range_bias import slow_error_var
 
 E = 6
-"""Place of the range error in the state."""
+"""Index of the range error in the state of a pair."""
 
 
 @small_kernel
 def decay_range_error(c, s, p, h, dt):
-    """Carry the range error of a pair over dt [s]: it fades with the way travelled."""
+    """Predict the range error of a pair over dt [s]: it decays with the distance travelled."""
     x, P = s.x, s.P
     v0, v1, v2 = x[p, h, 3], x[p, h, 4], x[p, h, 5]
     way = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + c.least_speed * c.least_speed) * dt
@@ -40,7 +39,7 @@ def decay_range_error(c, s, p, h, dt):
 
 @small_kernel
 def update_nlos_posterior(c, s, p, h, dt, nu, variance, w_e, evidence):
-    """Bayes' rule over what the sight was and is; updates the pair's NLOS probability.
+    """Update the NLOS probability of a pair by Bayes' rule over its transitions.
 
     Args:
         c: Coefficients.
@@ -49,12 +48,12 @@ def update_nlos_posterior(c, s, p, h, dt, nu, variance, w_e, evidence):
         h: Hypothesis.
         dt: Time since the pair's last range [s].
         nu: Innovation [m].
-        variance: Of the prediction [m2].
-        w_e: Covariance of the prediction and e [m2].
-        evidence: Of the power gap.
+        variance: Variance of the predicted range [m2].
+        w_e: Covariance of the predicted range and e [m2].
+        evidence: Log-likelihood ratio of NLOS against LOS from the powers.
 
     Returns:
-        Probability that the sight changed; that the range meant anything; log-likelihood.
+        Probability of a transition; inlier probability of the range; log-likelihood.
     """
     enter, leave = transition_probs(c.los_to_nlos_rate, c.nlos_to_los_rate, dt)
     S = variance + c.range_var
@@ -77,7 +76,7 @@ def update_nlos_posterior(c, s, p, h, dt, nu, variance, w_e, evidence):
 
 @small_kernel
 def reset_bias_on_transition(c, s, p, h, switched):
-    """Forget the range error of a pair by the probability that its sight changed."""
+    """Mix the range error of a pair with a new one, weighted by the transition probability."""
     stays = 1.0 - switched
     for k in range(E):
         v = stays * s.P[p, h, k, E]

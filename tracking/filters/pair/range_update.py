@@ -1,4 +1,4 @@
-"""A range in a running pair: dead reckoning up to it, the outlier gate, the corrections."""
+"""Range update of a running pair: prediction, outlier gate and corrections."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tracking.kernels.jit import kernel, small_kernel
 from tracking.models.lever_arm import antenna_offset
 
 TIE = 1e-6
-"""[s] Times that differ by less are equal, whatever the clock began with."""
+"""[s] Times that differ by less are equal, whatever the origin of the clock."""
 
 
 @small_kernel
 def is_aided(c, node, t):
-    """True if the IMU of a node is heard."""
+    """True if the last IMU sample of a node is no older than `imu_timeout`."""
     return node.has_state and t - node.t_state <= c.imu_timeout
 
 
@@ -53,7 +53,7 @@ def advance_pair(c, s, p, t):
 
 @small_kernel
 def node_variance(c, node, aided):
-    """Squared acceleration noise density that a node adds."""
+    """Return the squared acceleration noise density of a node [m2/s4/Hz]."""
     if node.static:
         return 0.0
     if not aided:
@@ -63,10 +63,10 @@ def node_variance(c, node, aided):
 
 @small_kernel
 def passes_gate(c, s, p, t, distance):
-    """The outlier gate of the paper; updates the running average.
+    """Return whether a range passes the outlier gate of the paper; update the running average.
 
-    The allowed variation grows with the relative speed and with the age of the average, so
-    that a node that was silent and came back passes.
+    The allowed difference grows with the relative speed and with the age of the average, so
+    that the first range after a gap passes.
     """
     pair = s.pairs[p]
     if pair.n_ranges == 0:
@@ -147,7 +147,7 @@ def range_update(c, s, layout, p, t, distance, evidence, antenna_i, antenna_j, w
 
 @small_kernel
 def predicted_variance(P, p, h, work):
-    """Variance of a predicted range, and its covariance with the range's slow error [m2]."""
+    """Return the variance of a predicted range and its covariance with the slow error [m2]."""
     variance, w_e = 0.0, 0.0
     for r in range(P.shape[2]):
         total = 0.0

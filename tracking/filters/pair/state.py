@@ -1,9 +1,8 @@
-"""The arrays of the pair filters: what evolves, and what is derived once.
+"""Arrays of the pair filters: the state, and tables that are derived once.
 
 Three axes recur: ``env``, independent groups; ``hyp``, the bank of hypotheses about rotation
-and mirror image that a group is started with, one of which survives; ``pair``. Numbers that
-belong together are one record, so that compiled kernels get few arguments; they write the
-arrays in place.
+and reflection that a group starts with, one of which survives; ``pair``. Numbers that belong
+together are one record, so that kernels get few arguments. Kernels write the arrays in place.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ NODE = np.dtype(
         ("seen", "?"),  # after the first range
         ("present", "?"),  # in the group, with filters
         ("static", "?"),  # constant: never moves
-        ("levelled", "?"),  # constant: its carrier stays level
+        ("levelled", "?"),  # constant: its vehicle stays level
         ("yaw", "f8"),  # of the body [rad]
         ("yaw_rate", "f8"),  # low-passed [rad/s]
-        ("t_sum", "f8"),  # until when its acceleration is in the mean velocity [s]
-        ("accel_noise", "f8"),  # added noise density of its last sample [m/s2/sqrt(Hz)]
+        ("t_sum", "f8"),  # time up to which its acceleration is integrated in dv0, dv1 [s]
+        ("accel_noise", "f8"),  # additional noise density of its last sample [m/s2/sqrt(Hz)]
         ("psd", "f8"),  # constant: acceleration noise with an IMU [m/s2/sqrt(Hz)]
-        ("sideways_var", "f8"),  # constant: of its rear axle [m2/s2]; 0 if it may slide
+        ("sideways_var", "f8"),  # constant: of its rear axle's velocity [m2/s2]; 0 if it may slide
         ("ahead", "f8"),  # constants of its mount: means and variances
         ("ahead_var", "f8"),
         ("slip", "f8"),
@@ -47,16 +46,16 @@ PAIR = np.dtype(
         ("t_range", "f8"),  # time of the last accepted range [s]
         ("nis", "f8"),  # NIS of that range in the best hypothesis [-]
         ("mean_distance", "f8"),  # running average of accepted ranges [m]
-        ("start_r", "f8", (8,)),  # newest ranges of a pair not started, a ring [m]
-        ("start_t", "f8", (8,)),  # their times [s]
-        ("start_n", "i8"),  # how many came
-        ("t_start", "f8"),  # when the first came [s]
+        ("start_r", "f8", (8,)),  # ring buffer of the newest ranges before the start [m]
+        ("start_t", "f8", (8,)),  # times of these ranges [s]
+        ("start_n", "i8"),  # number of ranges collected
+        ("t_start", "f8"),  # time of the first of them [s]
         ("surveyed", "f8"),  # surveyed distance [m]; 0 for none
-        ("t_used", "f8"),  # time of the last accepted range that meant anything [s]
+        ("t_used", "f8"),  # time of the last accepted range that was no outlier [s]
         ("interval", "f8"),  # running mean of the time between two ranges [s]
         ("n_ranges", "i8"),  # accepted ranges since the pair started
-        ("n_rejected", "i8"),  # ranges the gate has refused, ever
-        ("in_a_row", "i8"),  # ranges refused since the last accepted one
+        ("n_rejected", "i8"),  # ranges rejected by the gate in total
+        ("in_a_row", "i8"),  # ranges rejected since the last accepted one
         ("i", "i8"),  # constant: node indices, i < j
         ("j", "i8"),
     ]
@@ -64,24 +63,24 @@ PAIR = np.dtype(
 GROUP = np.dtype(
     [
         ("started", "?"),
-        ("flat", "?"),  # the layout was too flat to tell its mirror image
-        ("n_alive", "i8"),  # hypotheses still considered
+        ("flat", "?"),  # the layout was degenerate: its reflection was not observable
+        ("n_alive", "i8"),  # number of hypotheses left
         ("best", "i8"),  # the hypothesis reported
-        ("undecided", "?"),  # nothing has spoken for it yet
+        ("undecided", "?"),  # no hypothesis has been the likeliest yet
         ("t_mds", "f8"),  # time of the last refinement [s]
-        ("t_wheels", "f8"),  # time of the last use of the wheels [s]
-        ("dv0", "f8"),  # sum over nodes of what their acceleration added since then [m/s]
+        ("t_wheels", "f8"),  # time of the last update with motion constraints [s]
+        ("dv0", "f8"),  # accelerations integrated since then, sum over nodes [m/s]
         ("dv1", "f8"),
         ("misfit", "f8"),  # running mean of NIS [-]
-        ("t_check", "f8"),  # time of the last look at the bank [s]
-        ("nis_sum", "f8"),  # over accepted ranges, in the best hypothesis
+        ("t_check", "f8"),  # time of the last check of the bank [s]
+        ("nis_sum", "f8"),  # sum of NIS over accepted ranges, in the best hypothesis
         ("nis_n", "i8"),
     ]
 )
 
 
 class FilterState(NamedTuple):
-    """Everything that evolves."""
+    """State of the pair filters."""
 
     nodes: Records
     """NODE, (env, node)."""
@@ -96,24 +95,24 @@ class FilterState(NamedTuple):
     P: F64
     """Covariance, (env, pair, hyp, 7, 7)."""
     alive: Bool
-    """True for hypotheses still considered, (env, hyp)."""
+    """True for hypotheses that are left, (env, hyp)."""
     loglik: F64
-    """Log-likelihood of the ranges and wheels, (env, hyp)."""
+    """Log-likelihood of the ranges and motion constraints, (env, hyp)."""
     nlos: F64
-    """Probability that a pair is out of sight, (env, pair, hyp)."""
+    """NLOS probability of a pair, (env, pair, hyp)."""
     mean_v: F64
     """Mean velocity of the group, horizontal, (env, hyp, 2) [m/s]."""
     mean_cov: F64
-    """Its covariance, (env, hyp, 2, 2)."""
+    """Covariance of `mean_v`, (env, hyp, 2, 2) [m2/s2]."""
 
 
 class Layout(NamedTuple):
     """Tables derived once from the constellation."""
 
     pair_index: I64
-    """(node, node)"""
+    """Pair index of two nodes, (node, node)."""
     antenna_b: F64
-    """(antenna, 3) [m]"""
+    """Antenna positions in the body, (antenna, 3) [m]."""
     rotations: F64
     """Starting rotations and mirror images, (hyp, 3, 3)."""
 
@@ -133,7 +132,7 @@ def make_coefficients(
         "group_speed_var": w.group_speed_std**2,
         "wheel_period": w.period,
         **{f"gate_{k}": getattr(params.gate, k) for k in params.gate.__slots__},
-        # The cost of a refinement grows with the cube of the group: it keeps its share.
+        # A refinement costs the cube of the group size: the period keeps its share of the time.
         "mds_period": params.mds.period * max(1.0, (rows / 30.0) ** 2),
         "mds_min_spread": params.mds.min_spread,
         "start_k": start.k,
@@ -153,7 +152,7 @@ def make_layout(constellation: Constellation, params: PairEkfParams) -> Layout:
 def make_state(
     constellation: Constellation, params: PairEkfParams, n_envs: int, n_hyps: int
 ) -> FilterState:
-    """The state before any measurement."""
+    """Return the state before any measurement."""
     n, p = constellation.n_nodes, constellation.n_pairs
     nodes = np.zeros((n_envs, n), dtype=NODE)
     nodes["static"] = constellation.is_static

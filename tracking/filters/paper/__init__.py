@@ -1,4 +1,4 @@
-"""The algorithm of the paper as its text has it."""
+"""The algorithm of the paper as written in its text."""
 
 from tracking.filters.paper.filter import PaperEkf
 from tracking.filters.paper.params import PaperParams

@@ -1,4 +1,4 @@
-"""The loop over events: one pass in time order, estimates written where they are due."""
+"""Event loop: one pass in time order, which writes the estimates when they are due."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from tracking.filters.paper.pair_filter import correct, passes_gate, predict
 from tracking.filters.paper.state import PaperState
 from tracking.kernels.jit import allocating_kernel, kernel
 
-# Plain numbers of `Kind` and `Status`: kernels do not know enums.
+# Integer values of `Kind` and `Status`, since kernels cannot use enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 STARTING, OK, LOST = 1, 3, 4
 
 
 @allocating_kernel
 def run_events(constants, layout, state, block, t_out, out):
-    """Handle the events of every environment in order.
+    """Process the events of every environment in order.
 
     Args:
         constants: Constants (`make_constants`), (1).
@@ -26,7 +26,7 @@ def run_events(constants, layout, state, block, t_out, out):
         block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;
             (env, event, ...).
         t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
-            holds every event up to its time, that time included.
+            includes every event up to and including its time.
         out: Arrays written: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...).
     """
     t, kind, node_i, node_j, _, _, values, _, valid = block
@@ -65,7 +65,7 @@ def run_events(constants, layout, state, block, t_out, out):
 
 @kernel
 def process_attitude(c, s, layout, i, t, values):
-    """A node's orientation and world acceleration, eq. (1) and (2), held until the next."""
+    """Predict the pairs of node i to time t, then hold its controls, eq. (1) and (2)."""
     if s.nodes[i].present:
         for j in range(s.nodes.shape[0]):
             if j != i and s.nodes[j].present:
@@ -112,7 +112,7 @@ def update_range(c, s, layout, i, j, t, distance, is_survey, work):
 
 @allocating_kernel
 def write_estimate(c, s, t, e, o, out, x, P):
-    """Every filter at time t, without touching it."""
+    """Write the estimate of every filter, predicted to time t; the state does not change."""
     clear_estimate(e, o, out)
     pos, vel, cov, q_wb, has_q, age, nis, _, status = out
     for n in range(s.nodes.shape[0]):

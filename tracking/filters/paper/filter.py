@@ -1,9 +1,9 @@
-"""The algorithm of Armani and Holz (ICRA 2024) as its text has it, for a batch of groups.
+"""The algorithm of Armani and Holz (ICRA 2024) as written in its text, for a batch of groups.
 
-`tests/tracking/paper_reference.py` is the specification, equation by equation; this is the same,
-compiled. The filter takes nodes for their antennas, every range for line of sight, and never doubts
-its rotation: a pair is OK as soon as it runs. `docs/explanation/paper.md` has what it gives and
-what each option costs.
+`tests/tracking/paper_reference.py` is the specification, equation by equation; this package is its
+compiled form. The filter has no lever arms, assumes line of sight for every range, and does not
+monitor its rotation: a pair is OK as soon as it runs. `docs/explanation/paper.md` has its accuracy
+and the effect of each option.
 
 References:
     [1] Armani, Holz, Accurately tracking relative positions of moving trackers based on UWB

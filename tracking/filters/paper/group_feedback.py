@@ -17,14 +17,14 @@ REPLACE, NONE = 0, 2
 
 @allocating_kernel
 def align(X, target, rows, d):
-    """Rotate, reflect and shift X so that its first rows are nearest to the target's.
+    """Rotate, reflect and shift X so that the compared rows are nearest to those of the target.
 
-    By Procrustes' singular value decomposition.
+    The solution is that of the orthogonal Procrustes problem, by singular value decomposition.
 
     Args:
         X: Positions, (node, 3), written.
         target: Positions, (node, 3).
-        rows: True for those compared, (node).
+        rows: True for rows that are compared, (node).
         d: 2 or 3.
     """
     mean_x, mean, m = np.zeros(3), np.zeros(3), 0
@@ -54,7 +54,7 @@ def align(X, target, rows, d):
 
 @allocating_kernel
 def filter_positions(s, layout, members, m):
-    """Positions of nodes about their centre by the filters' x_ij, (member, 3)."""
+    """Return the positions of members about their centre by the filters' x_ij, (member, 3) [m]."""
     pos, present = np.zeros((m, 3)), 0
     for a in range(m):
         present += s.nodes[members[a]].present
@@ -84,7 +84,7 @@ def can_join(c, s, layout, new):
 
 @allocating_kernel
 def first_members(c, s, layout):
-    """The first three nodes, or both of two, whose pairs have their first ranges; none: empty."""
+    """Return the first three nodes, or both of two, whose pairs have first ranges, or none."""
     n = s.nodes.shape[0]
     for i in range(n):
         for j in range(i + 1, n):
@@ -156,7 +156,7 @@ def spawn(c, s, layout, new, t):
 
 @kernel
 def distance_between(c, s, layout, i, j, t):
-    """Distance of nodes i < j by their filter, else by their first measurements [m]."""
+    """Return the distance of nodes i < j by their filter, else by their first measurements [m]."""
     p = layout.pair_index[i, j]
     pair = s.pairs[p]
     if s.nodes[i].present and s.nodes[j].present:
@@ -170,7 +170,7 @@ def distance_between(c, s, layout, i, j, t):
 
 @kernel
 def start_filter(c, s, p, x_0, distance, t):
-    """The filter of a new pair: x_0, v_0 = 0, P_0 = I."""
+    """Start the filter of a new pair with x_0, v_0 = 0 and P_0 = I."""
     pair = s.pairs[p]
     both_static = s.nodes[pair.i].static and s.nodes[pair.j].static
     s.x[p], s.P[p] = 0.0, 0.0
@@ -185,13 +185,13 @@ def start_filter(c, s, p, x_0, distance, t):
 
 @kernel
 def forget_first(s, p):
-    """Begin to collect the first measurements of a pair."""
+    """Discard the first measurements of a pair."""
     s.pairs[p].first_sum, s.pairs[p].first_n = 0.0, 0
 
 
 @allocating_kernel
 def refine(c, s, layout, t):
-    """MDS over the group; its positions go to the filters for the next iteration."""
+    """Apply MDS to the group and feed its positions back to the filters."""
     s.group[0].n_since_mds = 0
     if c.feedback == NONE:
         return

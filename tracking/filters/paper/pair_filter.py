@@ -46,7 +46,7 @@ def predict(c, s, p, t, x, P):
 
 @kernel
 def passes_gate(c, s, p, t, distance):
-    """Gate a range of pair p; update its running average and its low-passed derivative."""
+    """Return whether a range passes the gate; update running average and low-passed derivative."""
     pair = s.pairs[p]
     age = t - pair.t_range
     v0, v1, v2 = s.x[p, 0, VEL], s.x[p, 0, VEL + 1], s.x[p, 0, VEL + 2]
@@ -76,8 +76,8 @@ def correct(c, s, p, distance, work):
         s: PaperState of one environment.
         p: Pair.
         distance: The range [m]; the derivative is that of the pair.
-        work: Rows as of `dynamics.correct`; row 2 holds the derivatives of the speed, row 3 the
-            state before; (4, 6).
+        work: Rows 0 and 1 as in `dynamics.correct`; row 2 has the derivatives of the speed, row 3
+            the state before the update; (4, 6).
 
     Returns:
         Squared innovation of the range over its variance.
@@ -115,8 +115,8 @@ def correct_position(s, p, pos, d, variance, work):
         p: Pair.
         pos: Measured position, (3) [m].
         d: 2 or 3.
-        variance: Of the measurement along each axis [m2].
-        work: Room, (4, 6).
+        variance: Variance of the measurement along each axis [m2].
+        work: Rows 0 and 1 as in `dynamics.correct`, (4, 6).
     """
     for k in range(d):
         work[0, :] = 0.0

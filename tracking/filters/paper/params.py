@@ -14,7 +14,7 @@ CHOICES = {
     "alignment": ("procrustes", "none"),
     "scaling": ("root", "fourth-root"),
 }
-"""Option to its values, the default first."""
+"""Values of each option, the default first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class PaperParams:
     range_std: float = 0.02
     """[m] Noise of a range: the root of the first element of R."""
     speed_std: float = 10.0
-    """[m/s] Noise of the low-passed derivative of the range: the root of the second of R."""
+    """[m/s] Noise of the low-passed range derivative: the root of the second element of R."""
     speed_tau: float = 0.1
     """[s] Time constant of the low-pass filter of the derivative."""
     gate_tau: float = 0.1
@@ -40,10 +40,10 @@ class PaperParams:
     gate_gain: float = 0.3
     """[s] Growth of the accepted difference with the last relative speed."""
     gate_reset: int = 8
-    """[-] Rejected ranges in a row after which the running average restarts at the range. The paper
-    names no way out of a wrong average."""
+    """[-] Number of ranges in a row outside the gate, the last of which restarts the average. The
+    paper specifies no recovery from a wrong average."""
     k: int = 8
-    """[-] Ranges and orientations of a pair that initialise its filter."""
+    """[-] Number of first measurements of a pair that initialise its filter."""
     mds_std: float = 0.1
     """[m] Noise of an MDS position, with `feedback="update"` only."""
     imu_timeout: float = 0.3
@@ -51,22 +51,22 @@ class PaperParams:
     lost_after: float = 1.0
     """[s] Age of the last accepted range beyond which a pair is LOST."""
     node_timeout: float = 5.0
-    """[s] Silence after which a node has left and its filters are destroyed."""
+    """[s] Age of the last range beyond which a node has left and its filters are destroyed."""
     speed: Literal["norm", "rate"] = "norm"
     """Model of the speed measurement: ``|v|`` as in eq. (10), or ``x . v / |x|``, which is the
     derivative of the range."""
     feedback: Literal["replace", "update", "none"] = "replace"
-    """What MDS does to the filters: it replaces x_ij; it is a measurement of x_ij with noise
-    `mds_std`; or nothing."""
+    """Use of the MDS positions: they replace x_ij, are measurements of x_ij with noise `mds_std`,
+    or are not used."""
     alignment: Literal["procrustes", "none"] = "procrustes"
     """Rotation and reflection of the MDS positions: those nearest to the filters' x_ij, or those of
-    the eigenvectors, which are arbitrary. The paper names none."""
+    the eigenvectors, which are arbitrary. The paper specifies none."""
     scaling: Literal["root", "fourth-root"] = "root"
     """Scale of the MDS positions: ``E Lambda^(1/2)``, which reproduces the distances, or the root
     of the root as the paper's Lambda_3 is defined, which does not."""
     first_layout: tuple[tuple[float, float, float], ...] | None = None
     """[m] Positions of all nodes that the first MDS is aligned to. None keeps the rotation and
-    reflection of the eigenvectors: the paper names no other."""
+    reflection of the eigenvectors: the paper specifies no other."""
 
     def __post_init__(self) -> None:
         check_numbers(self)

@@ -1,4 +1,4 @@
-"""Arrays of the paper's filter: what evolves, and the constants of its kernels."""
+"""Arrays of the paper's filter: the state, and the constants of its kernels."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ PAIR = np.dtype(
         ("rate", "f8"),  # low-passed derivative of the range [m/s]
         ("nis", "f8"),  # normalised innovation squared of the last accepted range [-]
         ("in_a_row", "i8"),  # ranges rejected since the last accepted one
-        ("n_rejected", "i8"),  # ranges rejected in all
+        ("n_rejected", "i8"),  # ranges rejected in total
         ("first_sum", "f8"),  # sum of the first ranges of a pair without filter [m]
-        ("first_n", "i8"),  # how many
+        ("first_n", "i8"),  # number of these ranges
         ("surveyed", "f8"),  # surveyed distance [m]; 0 for none
         ("i", "i8"),  # constant: node indices, i < j
         ("j", "i8"),
@@ -39,7 +39,7 @@ PAIR = np.dtype(
 GROUP = np.dtype(
     [
         ("n_since_mds", "i8"),  # ranges accepted since the last MDS
-        ("nis_sum", "f8"),  # over accepted ranges
+        ("nis_sum", "f8"),  # sum of NIS over accepted ranges
         ("nis_n", "i8"),
     ]
 )
@@ -48,7 +48,7 @@ REPLACE, UPDATE, NONE = range(3)
 
 
 class PaperState(NamedTuple):
-    """Everything that evolves."""
+    """State of the paper's filter."""
 
     nodes: Records
     """NODE, (env, node)."""
@@ -63,14 +63,14 @@ class PaperState(NamedTuple):
     x: F64
     """(x_ij, v_ij) of each pair, (env, pair, 1, 6) [m, m/s]."""
     P: F64
-    """Its covariance, (env, pair, 1, 6, 6)."""
+    """Covariance of `x`, (env, pair, 1, 6, 6)."""
 
 
 class Layout(NamedTuple):
     """Tables derived once from the constellation and the parameters."""
 
     pair_index: I64
-    """(node, node)"""
+    """Pair index of two nodes, (node, node)."""
     first: F64
     """Positions that the first MDS is aligned to, (node, 3) [m]."""
 
@@ -99,7 +99,7 @@ def make_layout(constellation: Constellation, params: PaperParams) -> Layout:
 
 
 def make_state(constellation: Constellation, n_envs: int) -> PaperState:
-    """The state before any measurement."""
+    """Return the state before any measurement."""
     n, p = constellation.n_nodes, constellation.n_pairs
     nodes = np.zeros((n_envs, n), dtype=NODE)
     nodes["t_imu"] = nodes["t_last_range"] = -np.inf
