@@ -50,7 +50,7 @@ from tracking.maths.rotation_modes import (
 
 @allocating_kernel
 def challenge_alignment(c, s, layout):
-    """Search other rotations of the only hypothesis, which stays as it is until one is likelier.
+    """Search for other rotations of the only hypothesis, which stays until one is likelier.
 
     Other rotations start with a lower likelihood, mirror images by `challenger_penalty`.
     """

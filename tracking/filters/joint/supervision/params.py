@@ -23,8 +23,8 @@ class SupervisionParams:
     outlier_nis: float = 6.0
     """[-] NIS from which on a range is an outlier, one in seventy; larger: fewer are."""
     surprise_limit: float = 1.2
-    """[-] Mean surprise of a group's ranges over `misfit_time` above which no pair is `ok`; 0.5 is
-    that of white noise alone. Larger: fewer groups are doubtful."""
+    """[-] Mean surprise of a group's ranges over `misfit_time` above which no moving pair is `ok`;
+    0.5 is that of white noise alone. Larger: fewer groups are doubtful."""
     residual_clip: float = 1.0
     """[m] Limit of a range's deviation in residual statistics; larger: outliers count more."""
     fastest: float = 10.0
