@@ -1,4 +1,4 @@
-"""The constants of the kernels, derived once from the parameters and the constellation."""
+"""Constants of the kernels, derived once from the parameters and the constellation."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tracking.records import Records, coefficients
 
 
 def make_coefficients(constellation: Constellation, params: JointParams) -> Records:
-    """Derive the constants of the kernels, (1); ``_var`` and ``2``: squared."""
+    """Return the constants of the kernels, (1); ``_var`` and ``2``: squared."""
     e, s = params.range_error, params.start
     v = params.nlos_in_space if constellation.dimensions == 3 else params.nlos
     gap_share = s.rotation_width_2d / s.rotations_2d
@@ -20,7 +20,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
     moving = [n for n in constellation.nodes if n.kind != "static"] or constellation.nodes
     white_var = e.white_std**2
     if not has_states:
-        # What lasts counts as white noise of the same weight over a second of driving.
+        # Lasting errors count as white noise of the same weight over a second of driving.
         white_var += e.lasting_weight * (e.fast_std**2 + e.slow_std**2)
     values = {
         "white_var": white_var,
@@ -55,7 +55,7 @@ def make_coefficients(constellation: Constellation, params: JointParams) -> Reco
 
 
 def count_states(constellation: Constellation, params: JointParams) -> int:
-    """How many states there are."""
+    """Return the number of states."""
     d = constellation.dimensions
     n = count_motion(constellation) + (d + 1) * int((~constellation.is_static).sum())
     for k in range(constellation.n_nodes):
@@ -66,33 +66,33 @@ def count_states(constellation: Constellation, params: JointParams) -> int:
 
 
 def count_rows(constellation: Constellation, params: JointParams) -> int:
-    """Length of the arrays of states: a few behind the last mean nothing.
+    """Return the length of the arrays of states: the number of states, padded with unused ones.
 
-    Compiled code takes up to eight numbers at a time, and what is left one by one.
+    Compiled code processes up to eight numbers at a time, and the rest one by one.
     """
     return whole_lines(count_states(constellation, params))
 
 
 def count_motion(constellation: Constellation) -> int:
-    """How many states are positions and velocities: the first of the vector."""
+    """Return the number of positions and velocities, the first states of the vector."""
     d = constellation.dimensions
     return sum(d if static else 2 * d for static in constellation.is_static)
 
 
 def moving_pairs(constellation: Constellation) -> Bool:
-    """True for pairs with a node that moves: those that are ranged, (pair)."""
+    """True for pairs with a moving node, which are ranged, (pair)."""
     return np.asarray(~constellation.is_static[constellation.pairs].all(axis=1))
 
 
 def has_offset(constellation: Constellation, params: JointParams, node: int) -> bool:
-    """True if the offset of a node's accelerometer has states: in space, where it turns about."""
+    """True if the accelerometer offset of a node has states: in space, with `offset_std`."""
     config = constellation.nodes[node]
     moves = config.kind != "static" and constellation.dimensions == 3
     return moves and params.vehicles[config.vehicle].offset_std is not None
 
 
 def has_mount(constellation: Constellation, params: JointParams, node: int) -> bool:
-    """True if where a node sits on its vehicle has states: where that matters and is unknown."""
+    """True if the mount of a node has states: unknown, on wheels, group of up to `max_mounts`."""
     config = constellation.nodes[node]
     vehicle = params.vehicles[config.vehicle]
     slides = config.kind == "static" or vehicle.sideways_std is None
@@ -102,5 +102,5 @@ def has_mount(constellation: Constellation, params: JointParams, node: int) -> b
 
 
 def has_range_errors(constellation: Constellation, params: JointParams) -> bool:
-    """True if the errors of ranges have states: in groups with not too many pairs."""
+    """True if range errors have states: in groups of up to `max_pairs` moving pairs."""
     return int(moving_pairs(constellation).sum()) <= params.range_error.max_pairs

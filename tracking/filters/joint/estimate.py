@@ -1,4 +1,4 @@
-"""The report: relative positions, velocities and covariances of the best hypothesis."""
+"""Estimates: relative positions, velocities and covariances of the best hypothesis."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ABSENT, STARTING, AMBIGUOUS, OK, LOST, DOUBTFUL = 0, 1, 2, 3, 4, 5
 
 @kernel
 def write_estimate(c, s, work, t, e, o, out):
-    """The best hypothesis at time t, without touching the state."""
+    """Write the estimate of the best hypothesis at time t; the state does not change."""
     clear_estimate(e, o, out)
     pos, vel, cov, q_wb, has_q, age, nis, nlos, status = out
     group = s.group[0]
@@ -77,7 +77,7 @@ def write_estimate(c, s, work, t, e, o, out):
 
 @kernel
 def pair_covariance(P, node_i, node_j, a, b, d):
-    """Covariance of two components of ``(p_j - p_i, v_j - v_i)``."""
+    """Return the covariance of two components of ``(p_j - p_i, v_j - v_i)``."""
     total = 0.0
     for one in range(2):
         node_a = node_j if one == 1 else node_i
@@ -92,7 +92,7 @@ def pair_covariance(P, node_i, node_j, a, b, d):
 
 @kernel
 def predict_estimate(c, s, work, t):
-    """The states at time t, written to the scratch."""
+    """Write the states at time t to the workspace."""
     h, n = s.group[0].best, s.nodes.shape[0]
     for r in range(c.n):
         work.x[0, r] = s.x[h, r]

@@ -1,4 +1,4 @@
-"""The loop over events: one pass in time order, estimates written where they are due."""
+"""Event loop: one pass in time order, with estimates written when they are due."""
 
 from __future__ import annotations
 
@@ -49,18 +49,18 @@ from tracking.models.nlos import power_evidence
 # Plain numbers of `Kind`: kernels do not know enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
 SAME = 1e-5
-"""[s] Ranges of one message differ by their rounding only: they share a prediction."""
+"""[s] Ranges of one message differ in time by rounding only: they share a prediction."""
 
 
 @kernel
 def run_events(coefficients, layout, state, work, block, t_out, out):
-    """Handle the events of every environment in order.
+    """Process the events of every environment in order.
 
     Args:
         coefficients: Constants (`make_coefficients`), (1).
         layout: Tables.
         state: JointState, updated.
-        work: Room.
+        work: Workspace.
         block: Events: t, kind, i, j, antenna_i, antenna_j, values, has_power, valid;
             (env, event, ...).
         t_out: Times at which estimates are due, ascending, (env, time) [s]. An estimate
@@ -68,7 +68,7 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
         out: Arrays written: pos, vel, cov, q, has_q, age, nis, nlos, status; (env, time, ...).
 
     Returns:
-        What has to be done elsewhere before it is called again, see `rare`.
+        Action that is due before the next call, see `rare`.
     """
     t, kind, node_i, node_j, antenna_i, antenna_j, values, has_power, valid = block
     c, cursor = coefficients[0], work.cursor
@@ -106,7 +106,7 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
                 cursor[NODE], action = i, REMOVE
             cursor[DONE] = action
             if action != NOTHING:
-                flush_all_updates(s)  # what is done elsewhere finds the covariance whole
+                flush_all_updates(s)  # rare kernels find no pending updates
                 cursor[ENV], cursor[EVENT], cursor[OUT] = e, k, o
                 return action
         while o < t_out.shape[1]:
@@ -128,9 +128,9 @@ def predict_all(coefficients, state, work, t):
 
 @kernel
 def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_survey):
-    """A range or survey between nodes i < j; returns what has to be done elsewhere, see `rare`.
+    """Process a range or survey between nodes i < j; return the action that is due (`rare`).
 
-    It is called again after that, and goes on from there: `work.cursor` has what is done already.
+    It is called again after that action, and continues: `work.cursor` has the last action done.
     """
     done, group = work.cursor[DONE], s.group[0]
     p = layout.pair_index[i, j]
@@ -138,7 +138,7 @@ def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_sur
         return NOTHING
     node_i, node_j = s.nodes[i], s.nodes[j]
     if done < TIME_OUT and group.alignment != NONE and t - group.t_check > c.node_timeout:
-        # Without ranges for so long, the first one finds all nodes as long away.
+        # After such a pause all nodes have timed out, before the first of them is seen again.
         return TIME_OUT
     if done < SPAWN and group.alignment == STATIC and not all_static(c, s, t):
         return SPAWN
@@ -174,9 +174,9 @@ def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_sur
 def predict_to(c, s, work, t, at_once):
     """Predict every hypothesis to time t, and apply the motion constraints that are due.
 
-    To propagate a covariance costs more than a range. So unless it has to be `at_once`, the states
-    stay where they are for a while, and ranges are predicted by the displacement since
-    (`range_update.predict_range`): only the noise of so short a time comes after them, not before.
+    Propagation of a covariance costs more than a range. So unless it is needed `at_once`, the
+    states stay at their time for a while, and ranges are predicted by the displacement since
+    (`range_update.predict_range`): only process noise of that time comes after them, not before.
     """
     group = s.group[0]
     constraints_due = t - group.t_constraints + SAME >= c.constraint_period
@@ -199,7 +199,7 @@ def predict_to(c, s, work, t, at_once):
 
 @kernel
 def propagate(c, s, work, t):
-    """Predict every hypothesis to time t."""
+    """Propagate every hypothesis to time t."""
     group = s.group[0]
     for i in range(s.nodes.shape[0]):
         if moves(s.nodes[i]):
@@ -223,7 +223,7 @@ def propagate(c, s, work, t):
 
 @kernel
 def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey):
-    """A range or survey of a running pair, at most `propagation_period` after the states."""
+    """Correct a running pair with a range or survey, within `propagation_period` of the states."""
     pair, group = s.pairs[p], s.group[0]
     i0, i1, i2 = antenna_offset(s.last_attitude_accel, layout, pair.i, a_i)
     j0, j1, j2 = antenna_offset(s.last_attitude_accel, layout, pair.j, a_j)
@@ -231,7 +231,7 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
     dt, is_news = max(t - pair.t_range, 0.0), False
     if is_survey:
         pair.t_range, pair.t_used, is_news = t, t, distance != pair.surveyed
-        collect(c, pair, t, distance, True)  # for when one of them comes again
+        collect(c, pair, t, distance, True)  # for a later join of one of them
     first, end = hypothesis_range(s)
     for h in range(first, end):
         if not s.alive[h]:
@@ -261,7 +261,7 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
 
 @kernel
 def collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_survey):
-    """A range or survey of a pair that does not run yet, i < j; returns what is to be done."""
+    """Collect a range or survey of a pair that does not run, i < j; return the action due."""
     collect(c, s.pairs[p], t, distance, is_survey)
     if s.pairs[p].start_n <= 1:
         s.pairs[p].start_nlos_llr = 0.0
@@ -276,7 +276,7 @@ def collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_su
 
 @kernel
 def next_join(c, s, layout, work, i, j, t, done):
-    """Which of the nodes of a range can join next."""
+    """Return the join action of the first node of a range that can join, or `NOTHING`."""
     for new, action in ((i, JOIN), (j, JOIN_OTHER)):
         is_due = done < action and done != START and not s.nodes[new].present
         if is_due and can_join(c, s, layout, new, work.idx, t) > 0:

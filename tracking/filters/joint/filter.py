@@ -1,14 +1,14 @@
 """One extended Kalman filter over all nodes of a group: the default filter.
 
-Pair filters share nodes and cannot know how their errors go together. Here all nodes are one
-state vector (`state`), so that every range informs every node it has to do with, and the
+Pair filters share nodes but do not estimate the correlation of their errors. Here all nodes are one
+state vector (`state`), so that every range corrects all nodes correlated with it, and the
 covariance is that of the group:
 
     predict     dead reckoning with the nodes' accelerations, biases and heading errors
-    correct     ranges, in sight or not (`range_update`); what is known about the vehicles
-    choose      among rotations and mirror images, by the likelihood of all that (`bank`)
+    correct     ranges, LOS or NLOS (`range_update`); motion constraints of the vehicles
+    choose      among rotations and mirror images, by the likelihood of all these (`bank`)
 
-`docs/explanation/tracker.md` derives it and says what each part is worth.
+`docs/explanation/tracker.md` derives it, `docs/benchmarks/tracker.md` has the worth of each part.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from tracking.records import as_records, with_records
 
 
 class JointEkf(BatchedFilter):
-    """One filter per group over a batch of groups; see the module."""
+    """Joint filter of a batch of groups; see the module."""
 
     follows_bias = True
     kernel = run_events
@@ -46,7 +46,7 @@ class JointEkf(BatchedFilter):
         self._layout = make_layout(constellation, params)
         n_hyps = bank_size(constellation, self._layout, params.start)
         state = make_state(constellation, params, n_envs, n_hyps)
-        # Of one hypothesis: all begin alike.
+        # Initial state of one hypothesis: all begin with the same.
         super().__init__(constellation, state, make_state(constellation, params, 1, 1))
         self._work = self._make_workspace(state.x.shape[2])
 
@@ -54,19 +54,19 @@ class JointEkf(BatchedFilter):
         run_to_end(handle, arguments)
 
     def bind(self, block: MeasurementBlock, estimate: TeamEstimate) -> Callable[[], None]:
-        """`run` for arrays that stay where they are; see `Filter.bind`."""
+        """Return `run` for arrays that stay in place; see `Filter.bind`."""
         arguments = self._arguments(block.in_place, estimate)
         compile_all(arguments)
         return partial(run_to_end, bind(run_events, *arguments), arguments)
 
     def calls(self, block: MeasurementBlock, estimate: TeamEstimate) -> list[list[Call]]:
-        """What is compiled for it; see `Filter.calls`."""
+        """Return the kernels that it needs; see `Filter.calls`."""
         arguments = self._arguments(block.in_place, estimate)
         with_ranges, *others = rare_calls(arguments)
         return [[(run_events, arguments), *with_ranges], *others]
 
     def smooth(self, later: MeasurementBlock, t: F64) -> TeamEstimate:
-        """Report at one time with the help of later measurements, and stay where it is.
+        """Return estimates at one time that use later measurements; the filter does not change.
 
         Args:
             later: Events after t, in order. STATE, not IMU.
@@ -101,14 +101,14 @@ class JointEkf(BatchedFilter):
         return read_clones(clones, estimate, self._state.x.shape[2])
 
     def range_noise(self) -> F64:
-        """Standard deviation of the white noise of ranges, given or learned so far, (env) [m]."""
+        """Return the standard deviation of white range noise, given or learned, (env) [m]."""
         std: F64 = np.sqrt(self._state.group["white_var"][:, 0])
         return std
 
     def fit_sums(self) -> F64:
-        """How well ranges fitted so far, (env, 4).
+        """Return sums over the ranges so far, (env, 4).
 
-        Sum of the log-likelihoods of all ranges, but for a constant, and their number; sum of the
+        Sum of the log-likelihoods of all ranges, without a constant, and their number; sum of the
         NIS of those accepted, and their number.
         """
         group = self._state.group[:, 0]
@@ -116,7 +116,7 @@ class JointEkf(BatchedFilter):
         return np.stack([group[name].astype(np.float64) for name in names], axis=-1)
 
     def part(self, envs: slice) -> Self:
-        """Some of the environments; shares their memory."""
+        """Return the filter of some environments; shares their memory."""
         part = super().part(envs)
         part._work = self._make_workspace(self._state.x.shape[2])
         return part
@@ -132,10 +132,10 @@ class JointEkf(BatchedFilter):
 
 
 def bank_size(constellation: Constellation, layout: Layout, start: JointStartParams) -> int:
-    """How many hypotheses there is room for.
+    """Return the number of places of the bank.
 
-    Those of all rotations, and the reflections of nodes that join meanwhile. Where one filter
-    stands for all rotations (`Alignment.LINEAR`), those of their likeliest modes.
+    All rotations, and second sides of nodes that join. If one filter represents all rotations
+    (`Alignment.LINEAR`), its likeliest modes.
     """
     n_rotations = len(layout.rotations)
     if constellation.dimensions == 2:

@@ -12,26 +12,26 @@ from tracking.vehicles import VEHICLES, VehicleParams
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RangeErrorParams:
-    """How a range errs in sight: white noise, and parts that stay while no node moves."""
+    """LOS range errors: white noise, and lasting parts that decay with the distance travelled."""
 
     white_std: float = 0.05
-    """[m] Of a single range."""
+    """[m] White noise of a range, the least that is learned; larger: ranges correct less."""
     fast_std: float = 0.03
-    """[m] Multipath that changes within decimetres."""
+    """[m] Fast lasting error: multipath that changes in decimetres; larger: ranges correct less."""
     fast_length: float = 0.4
-    """[m] Way of both ends after which it is another."""
+    """[m] Correlation length of the fast error over distance travelled; larger: slower decay."""
     slow_std: float = 0.045
-    """[m] Multipath and antennas, changing within metres."""
+    """[m] Slow lasting error: multipath and antennas, in metres; larger: ranges correct less."""
     slow_length: float = 8.0
-    """[m]"""
+    """[m] Correlation length of the slow error in LOS over that distance; larger: slower decay."""
     nonlinearity_gain: float = 1.0
-    """[-] Trust lost where the filter is uncertain across a short line of sight, in units of the
-    second-order error there. That error lasts, so it weighs more than once."""
+    """[-] Factor on the second-order error of a range, added as noise; it lasts, so it counts more
+    than once. Larger: near, uncertain nodes are corrected less."""
     max_pairs: int = 28
-    """[-] Larger groups have no states for these errors: their ranges count as worse and white."""
+    """[-] Pairs up to which lasting errors are states, else white noise; larger: slower."""
     lasting_weight: float = 10.0
-    """[-] Factor on the variances of these errors there, as white noise of the same weight over
-    a second of driving."""
+    """[-] Factor on the variances of lasting errors without states, which are white noise of the
+    same weight over a second of driving. Larger: ranges correct less."""
 
     def __post_init__(self) -> None:
         check_numbers(self, may_be_zero=("fast_std", "slow_std", "nonlinearity_gain"))
@@ -39,54 +39,53 @@ class RangeErrorParams:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NlosParams:
-    """Ranges that are not line of sight, and those that are plainly wrong."""
+    """NLOS ranges and outliers."""
 
     los_to_nlos_rate: float = 1.0
-    """[1/s] How often a pair loses sight."""
+    """[1/s] Rate of transitions from LOS to NLOS of a pair; larger: NLOS is more probable."""
     nlos_to_los_rate: float = 3.0
-    """[1/s] How often it regains it."""
+    """[1/s] Rate of transitions from NLOS to LOS of a pair; larger: NLOS is less probable."""
     los_to_nlos_rate_with_power: float = 1.0
-    """[1/s] The same where powers are reported: each range measures the line of sight."""
+    """[1/s] Rate from LOS to NLOS where each range has powers; larger: NLOS is more probable."""
     nlos_to_los_rate_with_power: float = 6.0
-    """[1/s] The same where powers are reported."""
+    """[1/s] Rate from NLOS to LOS where each range has powers; larger: NLOS is less probable."""
     nlos_bias: float = 0.1
-    """[m] Mean of what most obstacles add to a range."""
+    """[m] Mean bias of a range behind most obstacles; larger: NLOS ranges are shortened more."""
     nlos_bias_std: float = 0.2
-    """[m] Its standard deviation."""
+    """[m] Standard deviation of `nlos_bias`; larger: NLOS ranges correct less."""
     nlos_large_share: float = 0.0
-    """[-] Share of obstacles that add much more."""
+    """[-] Share of obstacles with a large bias (no powers); larger: more ranges count as NLOS."""
     nlos_large_share_with_power: float = 0.0
-    """[-] The same where powers are reported."""
+    """[-] Share of large biases where ranges have powers; larger: more ranges count as NLOS."""
     nlos_bias_large: float = 0.6
-    """[m] What they add, in the mean."""
+    """[m] Mean of a large bias; larger: longer ranges count as NLOS."""
     nlos_bias_large_std: float = 0.5
-    """[m] Its standard deviation."""
+    """[m] Standard deviation of a large bias; larger: a wider span of ranges counts as NLOS."""
     nlos_bias_length: float = 5.0
-    """[m] Distance travelled by both ends after which the excess is another. Too short a length
-    moves the layout where an obstacle lasts; the excess of one that passes is forgotten anyway when
-    the line of sight is back."""
+    """[m] Correlation length of the bias, over the distance travelled; larger: it lasts longer. Too
+    short, it moves the layout where an obstacle lasts; LOS resets the bias anyway."""
     white_std: float = 0.25
-    """[m] White noise that is added behind an obstacle: the excess jumps where paths change."""
+    """[m] White noise added to NLOS ranges, whose bias jumps; larger: these ranges correct less."""
     repeats: float = 20.0
-    """[-] Number of ranges in a row with the same excess: together they count as one."""
+    """[-] Successive ranges with one bias, counted as one without states; larger: less weight."""
     power_diff_los: float = 3.0
-    """[dB] Received minus first-path power in sight."""
+    """[dB] Mean of received minus first-path power in LOS; larger: NLOS is less probable."""
     power_diff_los_std: float = 1.2
-    """[dB]"""
+    """[dB] Standard deviation in LOS; larger: a large difference is weaker evidence of NLOS."""
     power_diff_nlos: float = 8.0
-    """[dB] The same behind an obstacle."""
+    """[dB] Mean of received minus first-path power in NLOS; larger: NLOS is less probable."""
     power_diff_nlos_std: float = 3.0
-    """[dB]"""
+    """[dB] Standard deviation in NLOS; larger: a small difference is weaker evidence of LOS."""
     power_diff_weight: float = 0.2
-    """[-] Gaps of successive ranges are alike, so that each counts for less than one."""
+    """[-] Weight of a power difference: successive ones are correlated; larger: they count more."""
     power_diff_most: float = 4.0
-    """[-] Log-likelihood ratio that the powers of a single range make at most."""
+    """[-] Largest log-likelihood ratio from the powers of a range; larger: they can count more."""
     least_prob: float = 1e-4
-    """[-] Neither NLOS nor its contrary is less probable."""
+    """[-] Bound of the probabilities of NLOS and of LOS; larger: transitions are found sooner."""
     outlier_prob: float = 1e-2
-    """[-] Share of ranges that mean nothing."""
+    """[-] Prior probability of an outlier; larger: ranges with large residuals correct less."""
     outlier_span: float = 20.0
-    """[m] They lie anywhere in so much."""
+    """[m] Width of the outliers' uniform density; larger: fewer ranges are taken for outliers."""
 
     def __post_init__(self) -> None:
         check_numbers(self, may_be_zero=("nlos_large_share", "nlos_large_share_with_power"))
@@ -99,8 +98,8 @@ class NlosParams:
 NLOS_IN_PLANE = NlosParams(
     los_to_nlos_rate=0.2, nlos_to_los_rate=1.0, nlos_large_share=0.3, nlos_bias_length=10.0
 )
-"""Without powers, small excesses are not told from other range errors: what counts are obstacles
-that stay for a second and may add half a metre."""
+"""Without powers, small biases cannot be separated from other range errors: only obstacles that
+last for a second and may add half a metre count."""
 NLOS_IN_SPACE = NlosParams(
     los_to_nlos_rate=0.5,
     nlos_to_los_rate=2.0,
@@ -109,69 +108,68 @@ NLOS_IN_SPACE = NlosParams(
     nlos_bias_length=10.0,
     white_std=0.2,
 )
-"""Published sets of ranges in buildings have an excess of 0.23 +- 0.38 m, 17 % beyond 0.5 m; these
-numbers make it 0.20 +- 0.35 m and 13 %. Groups in the plane, with fewer ranges to spare, would take
+"""Published sets of ranges in buildings have a bias of 0.23 +- 0.38 m, 17 % beyond 0.5 m; these
+values give 0.20 +- 0.35 m and 13 %. Groups in the plane have fewer ranges to spare and would take
 wrong calibrations and absurd ranges for such obstacles."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointStartParams:
-    """Starting a group, or a node that joins it, and the bank of hypotheses."""
+    """Start of a group, join of a node, and the bank of hypotheses."""
 
     k: int = 8
-    """[-] Ranges per pair whose mean starts the shape, the paper's first k measurements."""
+    """[-] Ranges of a pair in `max_age` that make it ready, the paper's k; larger: later start."""
     max_age: float = 2.0
-    """[s] The first k measurements must come within this time."""
+    """[s] Window of first ranges, and least wait of pairs with fewer; larger: older ones count."""
     min_ranges: float = 3.0
-    """[-] Minimum number of ranges of a pair that came in a longer time. The scatter of fewer is
-    unknown: one may be absurd."""
+    """[-] Least number of first ranges of a pair with fewer than `k`. The scatter of fewer is
+    unknown: one may be absurd. Larger: such pairs start later."""
     rotations_2d: int = 16
-    """[-] Rotations tried in the plane, each with its mirror image."""
+    """[-] Rotations tried in the plane, each with its mirror image; larger: finer, slower."""
     rotation_width_2d: float = 2.4
-    """[rad] Uncertainty of each of them, times their number: two fifths of the gap between two."""
+    """[rad] Error of each rotation times `rotations_2d`, 2/5 of the gap; larger: more overlap."""
     rotation_std_3d: float = 0.4
-    """[rad] The same of a first rotation in space."""
+    """[rad] Standard deviation of the first rotation in space; larger: it is corrected more."""
     spare_hypotheses: int = 8
-    """[-] Room in the plane for more hypotheses than rotations: two sides of newcomers."""
+    """[-] Places of the bank in the plane beyond its rotations; larger: more second sides fit."""
     modes_3d: int = 9
-    """[-] Room for modes of the rotation of a group in space."""
+    """[-] Places of the bank in space; larger: more modes of the rotation can be followed."""
     first_powers_most: float = 7.0
-    """[-] Log-likelihood ratio that the powers of a pair's first ranges make at most."""
+    """[-] Largest log-likelihood ratio from a pair's first powers; larger: they can count more."""
     position_std: float = 0.25
-    """[m] Error of a node in the first shape."""
+    """[m] Least standard deviation of a first position; larger: ranges correct it more."""
     speed_std: float = 1.5
-    """[m/s] Of a node that was not seen at rest."""
+    """[m/s] First velocity of a node not at rest, per axis; larger: it is corrected more."""
     short_error: float = 0.12
-    """[m] Scale of the errors of ranges that are too short, in the search for a node's position."""
+    """[m] Scale of the errors of too short ranges in multilateration; larger: they count less."""
     long_error: float = 0.3
-    """[m] The same of ranges that are too long: obstacles lengthen them."""
+    """[m] Scale of too long ranges in multilateration (obstacles); larger: they count less."""
     largest_loss: float = 16.0
-    """[-] A single range says no more than this against a position, in squares of these scales."""
+    """[-] Limit of a range's loss in multilateration, squared scales; larger: outliers pull
+    more."""
     far_weight: float = 0.01
-    """[-] How much such a range still pulls."""
+    """[-] Factor on the weight of a range at `largest_loss`; larger: outliers pull more."""
     join_spread: float = 0.75
-    """[m] Others that extend less than this along an axis leave the side of a node open: along it,
-    an error of a range counts several times."""
+    """[m] RMS extent of the other nodes along an axis up to which the side of a node is open: a
+    range error counts several times along it. Larger: more joins on two sides."""
     second_side_loss: float = 9.0
-    """[-] A second side that ranges say so much more against is none: three standard deviations of
-    a single one."""
+    """[-] Loss up to which a second side is kept, 3 sigma of one range; larger: more are kept."""
     prune: float = 20.0
-    """[-] A hypothesis so much less likely than the best (log-likelihood) is dropped."""
+    """[-] Log-likelihood behind the best that drops a hypothesis; larger: dropped later."""
     merge_distance: float = 0.15
-    """[m] Two hypotheses as near as this in every pair are one."""
+    """[m] Hypotheses that differ by less at every node are merged; larger: fewer are kept."""
     nis_cap: float = 9.0
-    """[-] A single measurement counts for at most this in the likelihood."""
+    """[-] Largest NIS that one measurement adds against a hypothesis; larger: one can decide."""
     check_period: float = 0.1
-    """[s] Time between two looks at the bank."""
+    """[s] Period of supervision, pruning and alignment; larger: slower reaction, cheaper."""
     respawn_nis: float = 0.8
-    """[-] Slow mean of the NIS of ranges from which on it is doubted how the layout is turned. It
-    is 0.4 where all is well, as a range counts less than its noise alone would allow, and up
-    to 1.0 in recordings of sensors that are known less well."""
+    """[-] Slow mean NIS of ranges that challenges the alignment: 0.4 if all is well, as ranges
+    count less than noise allows, up to 1.0 with less known sensors. Larger: fewer challenges."""
     height_std: float = 1.0
-    """[m] How much fixed nodes differ in height from each other, where nothing tells how the group
-    is turned: people put them into rooms, which are wider than they are high."""
+    """[m] Prior spread of the heights of fixed nodes while the rotation is unknown: rooms are wider
+    than they are high. Larger: their heights say less about the rotation."""
     challenger_penalty: float = 10.0
-    """[-] Log-likelihood by which other rotations have to make up for being looked at so late."""
+    """[-] Log-likelihood deficit at which challenging rotations start; larger: fewer succeed."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -179,45 +177,41 @@ class JointStartParams:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UpdateParams:
-    """How a measurement corrects: linearisation, robust weights, what is at rest.
-
-    All are the authors' choice, on simulated runs.
-    """
+    """Updates: linearisation, robust weights, rest; the authors' choice, on simulated runs."""
 
     largest_bend: float = 0.2
-    """[m] The error of linearisation counts for at most this."""
+    """[m] Limit of the second-order error of a range; larger: it can lower the weight more."""
     reset_at_once: float = 0.1
-    """[-] A sight that may have changed with a smaller probability is forgotten with the next
-    prediction, which costs nothing."""
+    """[-] Probability of an NLOS transition from which on the slow error is reset at once; below
+    it, with the next prediction, which costs nothing. Larger: later resets, cheaper."""
     contradiction_share: float = 0.7
-    """[-] A pair whose mean NIS is above this share of `JointParams.pair_nis_limit` counts
-    less (`contradiction_power`)."""
+    """[-] Share of `JointParams.pair_nis_limit` above which the mean NIS of a pair lowers the
+    weight of its ranges (`contradiction_power`). Larger: fewer pairs are affected."""
     contradiction_power: float = 4.0
-    """[-] Power of the ratio of the two by which such a pair counts less."""
+    """[-] Power of mean NIS over that limit by which the weight is divided; larger: less weight."""
     least_sane: float = 0.5
-    """[-] A range that means anything with less probability is refused."""
+    """[-] Inlier probability above which a range is accepted, not an outlier; larger: fewer are."""
     least_trust: float = 1e-3
-    """[-] A range that is trusted less corrects nothing."""
+    """[-] Weight up to which a range corrects nothing; larger: more ranges are left out."""
     glide_nis: float = 9.0
-    """[-] A node that looks at rest, but whose velocity is known with this NIS, glides."""
+    """[-] NIS of the velocity above which a node that looks at rest glides; larger: more ZUPTs."""
     centre_std: float = 1.0
-    """[m] Uncertainty of the centre of the group, which nothing measures."""
+    """[m] Standard deviation of the unobservable centre; relative positions do not depend on it."""
     centre_period: float = 1.0
-    """[s] Time between two moves of the centre to the origin."""
+    """[s] Period with which the centre is moved to the origin; larger: cheaper, more drift."""
     follow_share: float = 0.01
-    """[-] The covariance follows the positions once measurements have moved them by this share of
-    the extent of the group."""
+    """[-] Correction over the group's extent that shifts the null space; larger: less often."""
     follow_false: float = 0.05
-    """[-] Or once a range sees an uncertain rotation by this share of its noise."""
+    """[-] False rotation information over noise that shifts the null space; larger: less often."""
     follow_most: float = 0.3
-    """[-] It follows by at most this share of the extent at once."""
+    """[-] Largest shift of the null space over the group's extent; larger: it follows further."""
     yaw_rate_tau: float = 0.05
-    """[s] Low pass of the yaw rate of a vehicle that cannot move sideways."""
+    """[s] Low pass of the yaw rate in non-holonomic constraints; larger: smoother, later."""
     rest_tau: float = 0.1
-    """[s] Low passes of the rest detection."""
+    """[s] Low passes of the rest detector; larger: smoother, later."""
     rest_mean_share: float = 0.25
-    """[-] Share of the squared mean acceleration that counts as variation there: a long push is no
-    rest."""
+    """[-] Share of the squared mean acceleration added to its variance: a long push is no rest.
+    Larger: less rest is detected."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -225,18 +219,17 @@ class UpdateParams:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseLearningParams:
-    """How the white noise of ranges is learned (`range_noise`); all are the authors' choice."""
+    """Learning of the white noise of ranges (`range_noise`); all are the authors' choice."""
 
     learns: bool = True
-    """[-] Whether the white noise of ranges is learned; otherwise it stays that of
-    `RangeErrorParams`."""
+    """[-] True if the white noise of ranges is learned; else that of `RangeErrorParams` holds."""
     white_step: float = 0.01
-    """[-] Share by which a range moves the standard deviation."""
+    """[-] Relative change of the standard deviation by one range; larger: faster, noisier."""
     white_gap: float = 0.3
-    """[s] Two ranges of a pair are compared if they follow each other within this time."""
+    """[s] Time between two ranges of a pair below which they are compared; larger: more are."""
     most_learned: float = 5.0
-    """[-] It becomes no larger than by this factor, and no smaller than at first: ranges that are
-    rounded to a decimetre repeat themselves, and err all the same."""
+    """[-] Largest factor on the first standard deviation, which is also the least: ranges rounded
+    to a decimetre repeat themselves, and err all the same. Larger: noisier ranges are learned."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -244,13 +237,13 @@ class NoiseLearningParams:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointParams:
-    """One filter over all nodes."""
+    """Parameters of the joint filter."""
 
     vehicles: dict[str, VehicleParams] = field(default_factory=lambda: dict(VEHICLES))
-    """By `NodeConfig.vehicle`."""
+    """Vehicles by `NodeConfig.vehicle`."""
     range_error: RangeErrorParams = field(default_factory=RangeErrorParams)
     nlos: NlosParams = NLOS_IN_PLANE
-    """In the plane."""
+    """NLOS ranges of groups in the plane."""
     nlos_in_space: NlosParams = NLOS_IN_SPACE
     noise_learning: NoiseLearningParams = field(default_factory=NoiseLearningParams)
     update: UpdateParams = field(default_factory=UpdateParams)
@@ -258,49 +251,49 @@ class JointParams:
     alignment: AlignmentParams = field(default_factory=AlignmentParams)
     supervision: SupervisionParams = field(default_factory=SupervisionParams)
     initial_heading_std: float = 0.1
-    """[rad] Error of headings that start from `NodeConfig.initial_heading`."""
+    """[rad] Error of headings from `NodeConfig.initial_heading`; larger: corrected more."""
     initial_heading_tau: float = 300.0
-    """[s] How long they keep it."""
+    """[s] Correlation time of the error of initial headings; larger: it lasts longer."""
     unaided_accel_psd: float = 1.5
-    """[m/s2/sqrt(Hz)] Acceleration of a moving node without samples of its IMU."""
+    """[m/s2/sqrt(Hz)] Acceleration of a node without IMU samples; larger: ranges move it more."""
     attitude_reset_gap: float = 0.5
-    """[s] After a longer silence of its IMU the orientation of a node is a new one: shorter gaps
-    are filled (`OrientationParams.max_gap`)."""
+    """[s] Gap of the IMU after which an orientation counts as new; shorter gaps are filled
+    (`OrientationParams.max_gap`). Larger: it goes on over longer gaps."""
     imu_timeout: float = 0.3
-    """[s] A node whose IMU was silent for so long is unaided."""
+    """[s] IMU silence that makes a node unaided; larger: its last acceleration is held longer."""
     static_drift: float = 1e-4
-    """[m/sqrt(s)] Static nodes may creep so much: keeps the covariance positive for ever."""
+    """[m/sqrt(s)] Random walk of static nodes: P stays positive; larger: ranges move them more."""
     survey_std: float = 0.02
-    """[m] Standard deviation of a surveyed distance."""
+    """[m] Standard deviation of a surveyed distance; larger: it corrects less."""
     rest_accel: float = 0.12
-    """[m/s2] A node whose acceleration varies less than this, and does not turn, may rest."""
+    """[m/s2] RMS variation of the acceleration below which a node may rest; larger: more rest."""
     rest_rate: float = 0.06
-    """[rad/s] A node that turns faster does not rest."""
+    """[rad/s] Angular rate below which a node may rest; larger: more rest."""
     rest_after: float = 0.5
-    """[s] It must have done so for so long."""
+    """[s] Time without motion after which a node is at rest; larger: rest is detected later."""
     rest_std: float = 0.02
-    """[m/s] Speed of a node at rest."""
+    """[m/s] Standard deviation of the velocity at rest, per axis; larger: ZUPTs correct less."""
     constraint_period: float = 0.05
-    """[s] Time between two uses of what is known about the vehicles."""
+    """[s] Period of motion constraints; larger: they correct less, at less cost."""
     range_timeout: float = 0.5
-    """[s] A node without a range for so long joins again, if its distances to all others are less
-    certain than 0.7 `stale_std` by now. More than the time between two ranges of a node."""
+    """[s] Time without a range after which a node joins again if all its distances are less certain
+    than 0.7 `stale_std`; above the interval of its ranges. Larger: it coasts longer."""
     lost_after: float = 1.0
-    """[s] A pair without a range for so long is lost."""
+    """[s] Least time without an accepted range after which a pair is `lost`; larger: later."""
     node_timeout: float = 5.0
-    """[s] A node without a range for so long has left; its states are forgotten."""
+    """[s] Time without a range after which a node has left, its states reset; larger: later."""
     pair_nis_limit: float = 6.0
-    """[-] A pair whose ranges misfit so badly, as a running mean of NIS, is doubtful."""
+    """[-] Running mean NIS of its ranges above which a pair is `doubtful`; larger: fewer are."""
     node_bias_limit: float = 0.33
-    """[m] A node all of whose ranges err by so much, over the root of their number, is doubted."""
+    """[m] Common range error to n nodes, times root n, that is a node's fault; larger: fewer."""
     max_mounts: int = 12
-    """[-] Larger groups have no states for where trackers sit on cars: it counts as noise. In
-    groups of ten they are worth up to a tenth of the error, in groups of twenty nothing, at a third
-    of the time of a start."""
+    """[-] Largest group with states for unknown mounts, which are noise in larger ones; larger:
+    slower. In groups of ten they are worth up to a tenth of the error, in groups of twenty nothing,
+    at a third of the time of a start."""
     stale_std: float = 1.0
-    """[m] Of positions of nodes that were silent, see `range_timeout`."""
+    """[m] Distance uncertainty that ends coasting, times 0.7 (`range_timeout`); larger: later."""
     accuracy: float | None = None
-    """[m] That of all pairs, in place of `VehicleParams.accuracy`."""
+    """[m] Accuracy of all pairs in place of `VehicleParams.accuracy`; larger: more are `ok`."""
 
     def __post_init__(self) -> None:
         check_numbers(self)

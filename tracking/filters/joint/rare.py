@@ -1,8 +1,8 @@
-"""What is rare and large: each is compiled by itself, when it is first needed.
+"""Rare, large operations: each is compiled by itself, when it is first needed.
 
 `event_loop.run_events` returns the number of an action and is called again when its kernels are
-done. So those that track a log compile what the log needs, and a range reaches little code; what is
-for groups in space alone is not compiled for groups in the plane.
+done. So a log compiles only the kernels that it needs, and a range reaches little code; those for
+groups in space alone are not compiled for groups in the plane.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from tracking.kernels.jit import Call, bind, kernel
 
 @kernel
 def time_out(coefficients, layout, state, work, t):
-    """Remove nodes without ranges for long."""
+    """Remove nodes that have timed out."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
     drop_timed_out(coefficients[0], s, layout, t)
@@ -41,7 +41,7 @@ def time_out(coefficients, layout, state, work, t):
 
 @kernel
 def spawn(coefficients, layout, state, work, t):
-    """Follow all rotations and mirror images, as the first node moves."""
+    """Spawn all rotations and mirror images, as the first node moves."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
     spawn_rotation_hypotheses(coefficients[0], s, layout, work)
@@ -56,7 +56,7 @@ def align(coefficients, layout, state, work, t):
 
 @kernel
 def stale(coefficients, layout, state, work, t):
-    """Remove nodes that were silent and may be anywhere."""
+    """Remove silent nodes whose distances are uncertain."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
     drop_stale(coefficients[0], s, layout, t)
@@ -64,14 +64,14 @@ def stale(coefficients, layout, state, work, t):
 
 @kernel
 def modes(coefficients, layout, state, work, t):
-    """Move each hypothesis to its mode of the rotation."""
+    """Rotate the frame of each hypothesis to its mode."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     monitor_modes(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
 
 
 @kernel
 def split(coefficients, layout, state, work, t):
-    """Follow all rotations and mirror images of a group whose rotation is too uncertain."""
+    """Spawn all rotations and mirror images of a group whose rotation is too uncertain."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
     split_rotation(coefficients[0], s, layout, work)
@@ -79,28 +79,28 @@ def split(coefficients, layout, state, work, t):
 
 @kernel
 def reflect(coefficients, layout, state, work, t):
-    """Add the mirror image."""
+    """Add the mirror image of the best hypothesis."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     add_mirror_image(coefficients[0], by_reference(one_env(state, cursor[ENV])))
 
 
 @kernel
 def challenge_in_plane(coefficients, layout, state, work, t):
-    """Follow all rotations and mirror images again."""
+    """Spawn all rotations and mirror images again."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     challenge(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
 
 
 @kernel
 def challenge_in_space(coefficients, layout, state, work, t):
-    """Look for a likelier rotation or mirror image."""
+    """Search for a likelier rotation or mirror image."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     challenge_alignment(coefficients[0], by_reference(one_env(state, cursor[ENV])), layout)
 
 
 @kernel
 def reinitialise(coefficients, layout, state, work, t):
-    """Look for another position of a node."""
+    """Search for another position of a node."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     s = by_reference(one_env(state, cursor[ENV]))
     cursor[FLAG] = reinitialise_node(coefficients[0], s, layout, cursor[NODE], cursor[FLAG] != 0, t)
@@ -115,7 +115,7 @@ def start_group(coefficients, layout, state, work, t):
 
 @kernel
 def survey_group(coefficients, layout, state, work, t):
-    """Use the surveyed distances of a group that has just started."""
+    """Correct a group that has just started with its surveyed distances."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     c, s = coefficients[0], by_reference(one_env(state, cursor[ENV]))
     for a in range(s.nodes.shape[0]):
@@ -124,7 +124,7 @@ def survey_group(coefficients, layout, state, work, t):
 
 @kernel
 def join_group(coefficients, layout, state, work, t):
-    """Let a node join."""
+    """Add a node to the group."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     c, s, new = coefficients[0], by_reference(one_env(state, cursor[ENV])), cursor[NODE]
     join(c, s, layout, new, t)
@@ -132,7 +132,7 @@ def join_group(coefficients, layout, state, work, t):
 
 @kernel
 def survey_newcomer(coefficients, layout, state, work, t):
-    """Use the surveyed distances of a node that has just joined."""
+    """Correct a node that has just joined with its surveyed distances."""
     cursor, layout, work = work.cursor, by_reference(layout), by_reference(work)
     c, s, new = coefficients[0], by_reference(one_env(state, cursor[ENV])), cursor[NODE]
     apply_surveys(c, s, layout, work, new, s.nodes.shape[0])
@@ -161,9 +161,9 @@ ACTIONS: dict[int, tuple[Rare, ...]] = {
     workspace.JOIN_OTHER: (join_group, survey_newcomer),
     workspace.REMOVE: (remove,),
 }
-"""What an action is, one kernel after the other."""
+"""Kernels of each action, called one after the other."""
 WITH_RANGES = (survey_group, survey_newcomer)
-"""Those that share most of their code with what a range reaches."""
+"""Kernels that share most of their code with that of ranges."""
 ACTIONS_IN_SPACE: dict[int, tuple[Rare, ...]] = {
     **{action: done for action, done in ACTIONS.items() if action != workspace.SPLIT},
     workspace.SPAWN: (spawn, align),
@@ -171,21 +171,21 @@ ACTIONS_IN_SPACE: dict[int, tuple[Rare, ...]] = {
     workspace.CHALLENGE: (challenge_in_space,),
     workspace.START: (start_group, align, survey_group),
 }
-"""The same for groups with a linear alignment (`alignment_sensitivity.has_linear_alignment`)."""
+"""Kernels of each action with linear alignment (`alignment_sensitivity.has_linear_alignment`)."""
 
 
 def actions_of(coefficients: Any, state: Any) -> dict[int, tuple[Rare, ...]]:
-    """The actions that a group can need."""
+    """Return the actions that a group can need."""
     n_nodes, has_slopes = state.nodes.shape[1], state.sensitivity.shape[2] > 0
     return ACTIONS_IN_SPACE if has_slopes and n_nodes > coefficients[0]["d"] else ACTIONS
 
 
 def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
-    """Call `run_events` until all events are handled, and what it needs between.
+    """Call `run_events` until all events are handled, and the rare kernels that it requests.
 
     Args:
         run: `run_events` with its arguments.
-        arguments: Its arguments.
+        arguments: Arguments of `run_events`.
     """
     coefficients, layout, state, work, events, *_ = arguments
     work.cursor[:] = 0
@@ -196,16 +196,16 @@ def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
 
 
 def compile_all(arguments: tuple[Any, ...]) -> None:
-    """Compile everything ahead, for those that cannot wait later."""
+    """Compile all rare kernels in advance, for callers with deadlines."""
     for calls in rare_calls(arguments):
         for rare, given in calls:
             bind(rare, *given)
 
 
 def rare_calls(arguments: tuple[Any, ...]) -> list[list[Call]]:
-    """These kernels and their arguments, in groups that share little code.
+    """Return the rare kernels with their arguments, in groups that share little code.
 
-    Those that go with the ranges, the others of all groups of nodes, and those of groups in space.
+    The groups: kernels that share code with ranges, the others of all actions, those in space.
     """
     coefficients, layout, state, work, *_ = arguments
     given = coefficients, layout, state, work, 0.0

@@ -1,9 +1,9 @@
-"""Fixed-lag smoothing: what later measurements say about a moment, without touching the filter.
+"""Fixed-lag smoothing: estimates with later measurements, without changing the filter.
 
-The positions and velocities of that moment are put into the state vector a second time. They
-have no dynamics and no measurement looks at them, but they are correlated with the rest, so that
-every correction moves them as well: what they hold after the later measurements is the smoothed
-estimate, exactly as far as the filter itself is [1].
+The positions and velocities of a moment are added to the state vector as clones. They have no
+dynamics and no measurement depends on them, but they are correlated with the other states, so that
+every correction moves them as well: after the later measurements they are the smoothed estimate, as
+exact as the filter itself [1].
 
 References:
     [1] Moore, Discrete-time fixed-lag smoothing algorithms, Automatica 9 (1973) 163.
@@ -23,14 +23,14 @@ from tracking.records import Records
 
 
 def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, Records]:
-    """The best hypothesis of every environment, its motion doubled.
+    """Return the best hypothesis of every environment, with clones of its motion.
 
     Args:
-        state: Of the filter; not changed.
+        state: State of the filter; not changed.
         coefficients: Constants (`make_coefficients`), (1).
 
     Returns:
-        State with one hypothesis and the clones behind the other states, in the same order; its
+        State with one hypothesis and the clones after the other states, in the same order; its
         coefficients.
     """
     envs = np.arange(len(state.x))
@@ -69,13 +69,13 @@ def with_clones(state: JointState, coefficients: Records) -> tuple[JointState, R
 
 
 def read_clones(clones: JointState, estimate: TeamEstimate, n_states: int) -> TeamEstimate:
-    """The estimate with positions, velocities and covariances of the clones.
+    """Return the estimate with positions, velocities and covariances of the clones.
 
-    Pairs that are not running keep what they had.
+    Pairs that do not run keep their values.
 
     Args:
-        clones: After the later measurements.
-        estimate: Of the moment, before them; (env, pair).
+        clones: State with clones, after the later measurements.
+        estimate: Estimate of the moment, without these; (env, pair).
         n_states: Length of the filter's own state vector.
     """
     constellation, nodes = estimate.constellation, clones.nodes[0]

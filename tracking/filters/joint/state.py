@@ -1,15 +1,15 @@
-"""The arrays of the joint filter: what evolves, and what is derived once.
+"""Arrays of the joint filter: the state that evolves, and tables derived once.
 
 One state vector holds all nodes of a group, in one world frame:
 
-    node           position (d) [m]; velocity (d) [m/s] of those that move
-    moving node    acceleration bias (d) [m/s2]; in space, where it is turned about, offset of its
-                   accelerometer, body frame (3) [m/s2]; heading error [rad]
+    node           position (d) [m]; velocity (d) [m/s] of moving nodes
+    moving node    acceleration bias (d) [m/s2]; heading error [rad]; in space, if it rotates about
+                   all axes, accelerometer offset [m/s2] and gyroscope bias [rad/s], body frame (3)
     pair           fast and slow part of its range error [m], in small groups
 
-in this order: what moves of all nodes, then what only fades. ``d`` is 2 or 3. The states of nodes
-that are not in the group are decoupled, with unit variance. Axes: ``env``, independent groups;
-``hyp``, the bank of hypotheses about rotation and mirror image.
+in this order: positions and velocities of all nodes, then states that decay. ``d`` is 2 or 3. The
+states of nodes that are not in the group are decoupled, with unit variance. Axes: ``env``,
+independent groups; ``hyp``, the bank of hypotheses about rotation and mirror image.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ from tracking.records import Records
 
 
 class JointState(NamedTuple):
-    """Everything that evolves."""
+    """State of the filter: all that evolves."""
 
     nodes: Records
     """NODE, (env, node)."""
     last_attitude_accel: F64
-    """q_wb and accel_w [m/s2] of the last STATE event, the acceleration levelled where the
-    carrier stays level, (env, node, 7)."""
+    """q_wb and accel_w [m/s2] of the last STATE event, the acceleration levelled for level
+    vehicles, (env, node, 7)."""
     preintegrated: F64
-    """Sums over inertial samples since the states' time, (env, node, N_PRE), see `ekf.columns`."""
+    """Preintegrated samples since the states' time, (env, node, N_PRE), see `ekf.columns`."""
     pairs: Records
     """PAIR, (env, pair)."""
     group: Records
@@ -56,34 +56,34 @@ class JointState(NamedTuple):
     P: F64
     """Covariance, (env, hyp, state, state), before pending updates are applied."""
     pending_updates: F64
-    """Corrections that wait, ``P - W^T W`` is the covariance, (env, hyp, correction, state)."""
+    """Pending updates W; the covariance is ``P - W^T W``, (env, hyp, update, state)."""
     n_pending: I64
-    """How many do, (env, hyp)."""
+    """Number of pending updates, (env, hyp)."""
     accumulated_correction: F64
-    """How far measurements moved the states since P last followed, (env, hyp, state)."""
+    """Sum of corrections since the last shift of the null space, (env, hyp, state)."""
     nlos: F64
-    """Probability that a pair has no line of sight, (env, hyp, pair)."""
+    """Probability of NLOS of a pair, (env, hyp, pair)."""
     bias_retention: F64
-    """How much of the slow range error of a pair is still what it was at the states' time; the
-    rest is forgotten when they are carried on, (env, hyp, pair)."""
+    """Share of the slow range error of a pair that is kept since the states' time; the next
+    propagation removes the rest, (env, hyp, pair)."""
     alive: Bool
-    """True for hypotheses still considered, (env, hyp)."""
+    """True for hypotheses in use, (env, hyp)."""
     loglik: F64
     """Log-likelihood of the measurements, (env, hyp)."""
     sensitivity: F64
     """In space, while the rotation of the group is unknown (`alignment_sensitivity`): derivatives
-    of the states by the elements of the turn, (env, hyp, 9, state); the next three as well."""
+    of the states by the elements of the rotation, (env, hyp, 9, state); so are the next three."""
     alignment_score: F64
-    """Derivatives of the log-likelihood by them, (env, hyp, 9)."""
+    """Derivatives of the log-likelihood by these elements, (env, hyp, 9)."""
     alignment_information: F64
-    """Its negative second derivatives, (env, hyp, 9, 9)."""
+    """Negative second derivatives of the log-likelihood by these elements, (env, hyp, 9, 9)."""
     alignment_cov: F64
-    """How uncertain the elements are, each by itself, (env, hyp, 9, 9)."""
+    """Covariance of these elements, (env, hyp, 9, 9)."""
 
 
 @kernel
 def one_env(state: JointState, e: int) -> JointState:
-    """The state of environment e; shares its memory."""
+    """Return the state of environment e; shares its memory."""
     return JointState(
         state.nodes[e],
         state.last_attitude_accel[e],
@@ -110,36 +110,36 @@ class Layout(NamedTuple):
     """Tables derived once from the constellation."""
 
     pair_index: I64
-    """(node, node)"""
+    """Pair of two nodes, (node, node)."""
     antenna_b: F64
-    """(antenna, 3) [m]"""
+    """Antenna positions in the body, (antenna, 3) [m]."""
     rotations: F64
     """Starting rotations and mirror images, (hyp, 3, 3)."""
 
 
 def make_layout(constellation: Constellation, params: JointParams) -> Layout:
-    """Derive the tables of the kernels."""
+    """Return the tables of the kernels."""
     rotations = starting_rotations(constellation.dimensions, params.start.rotations_2d)
     return Layout(constellation.pair_index, constellation.antenna_offset_b, rotations)
 
 
 def room_to_wait(n_states: int) -> int:
-    """How many corrections may wait: none where the covariance fits the nearest cache.
+    """Return how many updates may be pending: 0 if the covariance fits the nearest cache.
 
-    Room for a round of six nodes and what is known of their carriers.
+    Otherwise enough for the ranges of six nodes and their motion constraints.
     """
     return 24 if n_states > 48 else 0
 
 
 def open_elements(dimensions: int) -> int:
-    """Elements of the turn of a group: in the plane a bank of turns is followed instead."""
+    """Return the number of elements of the unknown rotation; 0 in the plane, which has a bank."""
     return 9 if dimensions == 3 else 0
 
 
 def make_state(
     constellation: Constellation, params: JointParams, n_envs: int, n_hyps: int
 ) -> JointState:
-    """The state before any measurement."""
+    """Return the state before any measurement."""
     n, p, d = constellation.n_nodes, constellation.n_pairs, constellation.dimensions
     n_states = count_rows(constellation, params)
     nodes = np.zeros((n_envs, n), dtype=NODE)

@@ -1,22 +1,21 @@
 """Feedback of the attitude filter: its tilt corrections, and the residual gyroscope bias.
 
-VQF corrects its tilt over some seconds by its accelerometer, whose offset and lasting motion it so
-takes for tilt. A horizontal bias b is gravity seen through a tilt (`attitude_coupling`), so after a
-correction by (t_x, t_y) about x and y of the world it is
+VQF corrects its tilt over some seconds by its accelerometer, whose offset and sustained
+accelerations it takes for tilt. A horizontal bias b is gravity seen through a tilt
+(`attitude_coupling`), so after a correction by (t_x, t_y) about x and y of the world it is
 
     b + g_0 (t_y, -t_x)
 
 VQF also removes a gyroscope bias, which it learns at rest, and in motion from these corrections.
-The residual g, three states in the body, turns its orientation by ``R(q_wb) g`` a second: the tilt
-error changes the horizontal bias by gravity, and the heading error grows:
+The residual g, three states in the body, rotates its orientation by ``R(q_wb) g`` a second: the
+tilt error changes the horizontal bias by gravity, and the heading error grows:
 
     theta = S g,  b += g_0 (theta_y, -theta_x),  heading error -= theta_z,  S = int R(q_wb) dt
 
 where g_0 is gravity; with a magnetometer the last is left out. Ranges observe g as any other state.
-Every attitude event reports the bias that VQF removes: when it changes, g changes by as much the
-other way. What VQF learns at rest is a measurement of g: from the variance V that it reports to a
-smaller one, V', of variance ``1 / (1 / V' - 1 / V)``. What it learns in motion is not used: ranges
-measure it better.
+Every attitude event reports the bias that VQF removes: when it changes, g changes by its negative.
+At rest, a reduction of its reported variance from V to V' is a measurement of g of variance
+``1 / (1 / V' - 1 / V)``. Changes in motion are not used as measurements: ranges measure g better.
 """
 
 from __future__ import annotations
@@ -42,13 +41,13 @@ RESTS = 2.0
 
 @small_kernel
 def last_state(node):
-    """The last state of a node that is not fixed, behind its bias."""
+    """Return the last state of a moving node's bias, offset, heading and gyroscope bias."""
     return node.i_gyro_bias + 2 if node.i_gyro_bias >= 0 else node.i_heading
 
 
 @small_kernel
 def process_gyro_bias(node, pre, i, values, e, k, begins):
-    """Take what a STATE event reports of the gyroscope of node i, the first event or a later."""
+    """Process the gyroscope bias that a STATE event of node i reports; the first if `begins`."""
     g0, g1, g2 = values[e, k, GYRO_BIAS], values[e, k, GYRO_BIAS + 1], values[e, k, GYRO_BIAS + 2]
     var = values[e, k, GYRO_VAR]
     if not begins:
@@ -67,10 +66,10 @@ def process_gyro_bias(node, pre, i, values, e, k, begins):
 
 @small_kernel
 def gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w):
-    """Let hypothesis h lean as node i does, and write the derivatives to row i of w.
+    """Apply reported changes to the gyroscope bias of node i; write derivatives to row i of w.
 
     Returns:
-        What is added to the two biases [m/s2] and to the heading error [rad].
+        Increments of the two biases [m/s2] and of the heading error [rad] in hypothesis h.
     """
     at, b0, b1, y = node.i_gyro_bias, 0.0, 0.0, 0.0
     for k in range(3):
@@ -87,7 +86,7 @@ def gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w):
 
 @small_kernel
 def decay_gyro_bias_transition(node, i, w, scale):
-    """What is added to biases and heading error of node i as they were, to what is left of them."""
+    """Scale the transition terms of node i by the decay of the states that they act on."""
     for k in range(2):
         w[i, TILT_STEP + k] *= scale[node.i_tilt_bias + k]
     for k in range(3):
@@ -98,7 +97,7 @@ def decay_gyro_bias_transition(node, i, w, scale):
 
 @small_kernel
 def propagate_gyro_bias_rows(node, P, h, i, w, scale):
-    """What g and the heading error add to the rows of biases and heading error of node i."""
+    """Add gyroscope bias and heading error to the rows of biases and heading error of node i."""
     b, y, g, undo = node.i_tilt_bias, node.i_heading, node.i_gyro_bias, 1.0 / scale[node.i_heading]
     for k in range(P.shape[2]):
         g0, g1, g2, y0 = P[h, g, k], P[h, g + 1, k], P[h, g + 2, k], undo * P[h, y, k]
@@ -111,7 +110,7 @@ def propagate_gyro_bias_rows(node, P, h, i, w, scale):
 
 @small_kernel
 def propagate_gyro_bias_columns(node, P, h, i, w, scale):
-    """The same for the columns."""
+    """Add gyroscope bias and heading error to the columns of biases and heading error of node i."""
     b, y, g, undo = node.i_tilt_bias, node.i_heading, node.i_gyro_bias, 1.0 / scale[node.i_heading]
     for r in range(P.shape[2]):
         g0, g1, g2, y0 = P[h, r, g], P[h, r, g + 1], P[h, r, g + 2], undo * P[h, r, y]
@@ -124,7 +123,7 @@ def propagate_gyro_bias_columns(node, P, h, i, w, scale):
 
 @small_kernel
 def propagate_gyro_bias_sensitivity(node, z, w, i, scale):
-    """The same for one row of slopes by an open turn, from row i of the step."""
+    """Add gyroscope bias and heading error to one row of sensitivities, from row i of the step."""
     g0, g1, g2 = z[node.i_gyro_bias], z[node.i_gyro_bias + 1], z[node.i_gyro_bias + 2]
     y0 = z[node.i_heading] / scale[node.i_heading]
     z[node.i_tilt_bias] += row_times(w, i, BY_GYRO, g0, g1, g2) - w[i, TILT_STEP + 1] * y0
@@ -134,7 +133,7 @@ def propagate_gyro_bias_sensitivity(node, z, w, i, scale):
 
 @small_kernel
 def process_tilt_correction(node, pre, i, values, e, k, is_new):
-    """Note how node i was turned upright between two STATE events, the later in column k."""
+    """Process the tilt correction of node i between two STATE events, the later in column k."""
     reported = node.i_acc_bias >= 0 and values[e, k, TOLD] != 0.0
     if reported:
         turned0, turned1 = values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1]
@@ -149,7 +148,7 @@ def process_tilt_correction(node, pre, i, values, e, k, is_new):
 
 @small_kernel
 def apply_tilt_correction(node, pre, x, h, i, cos_r, sin_r, w):
-    """Add that to the bias of node i in hypothesis h, and write it to row i of w."""
+    """Add tilt correction and gyroscope bias to node i in hypothesis h; write row i of w."""
     gain0, gain1 = turn(cos_r, sin_r, pre[i, TILT_GAIN], pre[i, TILT_GAIN + 1])
     b0, b1, y = gyro_bias_transition(node, pre, x, h, i, cos_r, sin_r, w)
     w[i, TILT_STEP], w[i, TILT_STEP + 1] = gain0 + b0, gain1 + b1
@@ -160,5 +159,5 @@ def apply_tilt_correction(node, pre, x, h, i, cos_r, sin_r, w):
 
 @small_kernel
 def tilt_bias_tau(node):
-    """How long the horizontal bias of a node stays the same [s]."""
+    """Return the correlation time of the horizontal bias of a node [s]."""
     return node.bias_tau_with_ahrs_feedback if node.has_ahrs_feedback else node.bias_tau

@@ -1,12 +1,12 @@
-"""Accelerometer offset and tilt error of a node that turns about all its axes.
+"""Accelerometer offset and tilt error of a node that rotates about all its axes.
 
-An offset o turns with the body: it adds ``R(q_wb) o``, preintegrated with the accelerations. A
+An offset o rotates with the body: it adds ``R(q_wb) o``, preintegrated with the accelerations. A
 horizontal bias b is gravity seen through a tilt of ``(-b_y, b_x, 0) / g``, and the acceleration is
 rotated by that tilt as well:
 
     a_measured = a + b + (b_x a_z, b_y a_z, -b_x a_x - b_y a_y) / g
 
-Without the last term the layout is tilted as the orientations of its moving nodes are.
+Without the last term the layout is tilted like the orientations of its moving nodes.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from tracking.maths.covariance import STATES
 from tracking.maths.exponentials import decay
 
 PER_GRAVITY = 1.0 / GRAVITY
-"""[s2/m] Tilt by which gravity gives a horizontal acceleration."""
+"""[s2/m] Tilt per horizontal acceleration, one over gravity."""
 
 
 @small_kernel
 def corrected_increments(node, pre, x, h, i):
-    """What the samples of node i add to velocity and way, as measured, its offset taken off."""
+    """Return increments of velocity and position of node i as measured, without its offset."""
     dv0, dv1, dv2 = pre[i, DV], pre[i, DV + 1], pre[i, DV + 2]
     dp0, dp1, dp2 = pre[i, DP], pre[i, DP + 1], pre[i, DP + 2]
     if node.i_acc_bias >= 0:
@@ -53,7 +53,7 @@ def corrected_increments(node, pre, x, h, i):
 
 @small_kernel
 def write_accel_bias_jacobian(node, pre, x, h, i, cos_r, sin_r, scale, w):
-    """Write to row i of w what an offset adds to velocity and way, and how much of it stays."""
+    """Write derivatives of velocity and position by an offset to row i of w, and its decay."""
     tilt0, tilt1 = PER_GRAVITY * x[h, node.i_tilt_bias], PER_GRAVITY * x[h, node.i_tilt_bias + 1]
     for of, by in ((ROTATION_V, BY_OFFSET_V), (ROTATION_P, BY_OFFSET_P)):
         for k in range(3):
@@ -67,7 +67,7 @@ def write_accel_bias_jacobian(node, pre, x, h, i, cos_r, sin_r, scale, w):
 
 @small_kernel
 def write_attitude_coupling(w, i, F):
-    """What a node in space gains by its offset, and what its height does by a tilt, to F."""
+    """Write to F the derivatives by the offset of a node in space, and of its height by a tilt."""
     g, y = PER_GRAVITY, STATES - 1
     F[i, 0, 2], F[i, 1, 2], F[i, y, 2] = (
         g * w[i, BY_HEADING_P + 1],

@@ -1,14 +1,14 @@
-"""The gauge of a group: its place and its rotation, which no range observes.
+"""Gauge of a group: its position and its rotation, which no range observes.
 
-Place: ranges and accelerations do not observe where the group as a whole is. Its centre is moved
-back to the origin from time to time, with a fixed uncertainty that is independent of all else;
+Position: ranges and accelerations do not observe the position of the group as a whole. Its centre
+is moved back to the origin once a period, with a fixed variance that is independent of all else;
 differences between nodes are not affected.
 
-Rotation: until a group has driven, it is known only as near as the nearest of those tried. Ranges
-between nodes at rest do not measure it, nor does a node that joins. A filter becomes certain of it
-all the same, by derivatives that are a little out of date, and is degrees off when the group begins
-to move. So its variance is kept, and restored where it is too small. In space one filter stands for
-all rotations until they are known (`alignment_sensitivity`).
+Rotation: until a group has driven, it is known no better than the gap between the rotations tried.
+Ranges between nodes at rest do not measure it, nor does a node that joins. Derivatives that are
+slightly out of date lower its variance all the same, and it is degrees off when the group begins to
+move. So its variance is monitored, and restored where it is too small. In space one filter
+represents all rotations until they are known (`alignment_sensitivity`).
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from tracking.kernels.jit import allocating_kernel, kernel
 
 @allocating_kernel
 def group_centre(c, s, h):
-    """Mean position [m] and velocity [m/s] of the present nodes in hypothesis h, (d) each.
+    """Return mean position [m] and velocity [m/s] of the present nodes in hypothesis h, (d) each.
 
-    With static nodes, velocities have no common part that is free: 0.
+    The velocity is 0 with static nodes, which fix it.
     """
     pos, vel, present, moving = np.zeros(c.d), np.zeros(c.d), 0, 0
     for node in s.nodes:
@@ -87,7 +87,7 @@ def centre(c, s, h, w):
 
 @kernel
 def add_translation_uncertainty(c, s, h, members, m):
-    """Add to P of hypothesis h that nothing is known of where the centre is."""
+    """Add a common position variance of the members to P of hypothesis h."""
     for a in range(m):
         for b in range(m):
             at_a, at_b = s.nodes[members[a]].i_pos, s.nodes[members[b]].i_pos
@@ -97,12 +97,12 @@ def add_translation_uncertainty(c, s, h, members, m):
 
 @allocating_kernel
 def heading_functional(s, h, but, A):
-    """Write what reads the turn of the group off an error of hypothesis h, by least squares.
+    """Write the functional that gives the rotation of the group in an error, by least squares.
 
     Args:
         s: JointState of one environment.
         h: Hypothesis.
-        but: A node to leave out, or -1.
+        but: Node to leave out, or -1.
         A: (state), zeros, written: 1 / m for each position.
 
     Returns:
@@ -127,7 +127,7 @@ def heading_functional(s, h, but, A):
 
 @allocating_kernel
 def heading_variance(c, s, h):
-    """Variance of the rotation of hypothesis h, which has no pending updates [rad2]."""
+    """Return the variance of the rotation of hypothesis h, which has no pending updates [rad2]."""
     A = np.zeros(c.n)
     heading_functional(s, h, -1, A)
     return A @ (s.P[h] @ A)
@@ -135,13 +135,13 @@ def heading_variance(c, s, h):
 
 @allocating_kernel
 def add_rotation_uncertainty(c, s, h, variance):
-    """Make it less certain how hypothesis h is turned, about every axis.
+    """Add a variance of the rotation about every axis to P of hypothesis h.
 
     Args:
         c: Coefficients.
         s: JointState of one environment.
         h: Hypothesis without pending updates, updated.
-        variance: What is added [rad2].
+        variance: Added variance [rad2].
     """
     n_axes, (mean, mean_v) = 3 if c.d == 3 else 1, group_centre(c, s, h)
     D = np.zeros((n_axes, c.n))
@@ -150,7 +150,7 @@ def add_rotation_uncertainty(c, s, h, variance):
             write_tangents(D, node.i_pos, s.x[h, node.i_pos : node.i_pos + c.d] - mean)
         if node.present and not node.static:
             write_tangents(D, node.i_vel, s.x[h, node.i_vel : node.i_vel + c.d] - mean_v)
-    # Clones of a time at which no node had moved either are rotated alike (`smoothing`).
+    # Clones (`smoothing`) of a time before any motion have the same rotation error.
     for r in range(min(c.n_motion, c.n - c.n_own)):
         D[:, c.n_own + r] = D[:, r]
     s.P[h] += variance * (D.T.copy() @ D)

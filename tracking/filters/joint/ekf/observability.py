@@ -1,22 +1,21 @@
-"""The rotation of the whole group: corrections go round, and the covariance follows them.
+"""Observability constraint: the null space of the covariance follows the corrections.
 
 No range measures the rotation of the group as a whole. At every estimate p the derivatives of the
-ranges are blind to one direction per axis, ``axis x p``. But the estimate moves from one range
-to the next, and with it the blind direction: what was blind to the first range is not quite
-blind to the second, and the filter comes to believe in a rotation that nothing has measured
-[1, 2]. It is worst where errors are as large as the group, as on a body.
+ranges have one null direction per axis, ``axis x p``. But the estimate moves from one range to the
+next, and with it the null direction: that of the first range is not quite that of the second, and
+the variance of the rotation falls although nothing has measured it [1, 2]. The effect is largest
+where errors are as large as the group, as on a body.
 
-So the error is thought of as a rotation of the group and the rest: ``e = N a + r``, with N the
-velocities and positions turned by one radian, and a the best rotation of the positions' errors.
+So the error is split into a rotation of the group and the rest: ``e = N a + r``, with N the
+velocities and positions rotated by one radian, and a the best rotation of the positions' errors.
 When measurements move the estimate, N becomes N + G, a and r stay: ``P <- T P T^T`` with
-``T = I + G A^T`` and A the functional that reads a from e. It is invariance under rotations,
-kept by the filter of section 4 of [2], in the states that are used here anyway.
+``T = I + G A^T`` and A the functional that reads a from e. This is the invariance under rotations
+of the filter of section 4 of [2], in the states that are used here anyway.
 
-A correction is linear: it moves every node straight ahead along its tangent, which is a rotation
-and a stretch of ``1 - cos``. Corrections back and forth stretch again and again, and what is known
-of a shape (distances that were surveyed) does not undo it, since it is used up. So what is a
-rotation in a move is made one, velocities with the positions; in space only: in the plane all
-nodes range with each other, which takes back within the same move what a layout has grown by.
+A correction is linear: it moves every node along its tangent, which is a rotation and a stretch of
+``1 - cos``. Stretches add up, and information about the shape that is used up (surveyed distances)
+does not undo them. So the rotation in a move is made a finite one, velocities with the positions;
+in space only: in the plane all nodes range with each other, which undoes them within the same move.
 
 References:
     [1] Huang, Mourikis, Roumeliotis, Observability-based rules for designing consistent EKF
@@ -35,15 +34,15 @@ from tracking.maths.covariance import mirror, sum_rows
 from tracking.maths.rotation_modes import rotation_exp
 
 LINE = 1e-3
-"""[-] Share of a group's extent that a line has across, so that it has a rotation about itself."""
+"""[-] Share of the inertia of a group that is added about every axis, for layouts in a line."""
 
 
 @kernel
 def enforce_observability(c, s, h, work):
-    """Let the covariance of hypothesis h follow what measurements have moved.
+    """Shift the null space of hypothesis h once corrections or their false information are large.
 
-    That must not be late while the rotation is uncertain: each range with a false derivative by it
-    rotates the group, which makes the next derivative more false.
+    A late shift is harmful while the rotation is uncertain: each range with a false derivative by
+    it rotates the group, which makes the next derivative more false.
     """
     moved, present, extent2, moved2 = s.accumulated_correction[h], 0, 0.0, 0.0
     for k in range(c.d):
@@ -66,7 +65,7 @@ def enforce_observability(c, s, h, work):
 
 @small_kernel
 def propagate_corrections(c, s, h):
-    """What measurements moved velocities by moves positions on until the end of the sums."""
+    """Add corrections of velocities, times the preintegrated time, to those of positions."""
     moved = s.accumulated_correction[h]
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
@@ -77,7 +76,7 @@ def propagate_corrections(c, s, h):
 
 @allocating_kernel
 def shift_nullspace(c, s, h, share, work):
-    """Make rotations of what was moved, and ``P <- T P T^T`` for the given share of it."""
+    """Make the corrections rotations, and set ``P <- T P T^T`` for the given share of them."""
     flush_updates(s, h)
     d, n_axes, x, moved = c.d, 3 if c.d == 3 else 1, s.x[h], s.accumulated_correction[h]
     A, B, G = work.turns[0, :n_axes], work.turns[1, :n_axes], work.turns[2, :n_axes]
@@ -91,7 +90,7 @@ def shift_nullspace(c, s, h, share, work):
                 shift[k] += moved[node.i_pos + k]
                 m += 1
     for k in range(d):
-        centre[k], shift[k] = d * centre[k] / m, d * shift[k] / m  # before the move, and of it
+        centre[k], shift[k] = d * centre[k] / m, d * shift[k] / m  # before the move; its mean
     for node in s.nodes:
         if node.present:
             for k in range(d):
@@ -100,7 +99,7 @@ def shift_nullspace(c, s, h, share, work):
     w = make_functionals(A, work.idx[:m], moved)
     if d == 3:
         tangent, bend = np.zeros((3, 3)), rotation_exp(w) - np.eye(3)
-        write_tangents(tangent, 0, w)  # the matrix of w x
+        write_tangents(tangent, 0, w)  # cross product matrix of w
         bend -= tangent
         for node in s.nodes:
             if node.present:
@@ -121,7 +120,7 @@ def shift_nullspace(c, s, h, share, work):
         for r in range(m):
             work.val[r] = A[a, work.idx[r]]
         sum_rows(P, h, work.idx, work.val, m, s.pending_updates, work.share, 0, B[a])
-    # With half of A B^T G more, B^T G + G^T B is all that T adds to P.
+    # With half of A B^T G added to B, T adds B^T G + G^T B to P.
     half = np.zeros((n_axes, n_axes))
     for r in work.idx[:m]:
         for a in range(n_axes):
@@ -144,7 +143,7 @@ def shift_nullspace(c, s, h, share, work):
 
 @small_kernel
 def write_tangents(N, at, v):
-    """Write a vector, turned by a radian about each axis, to columns `at` of N, (axis, state)."""
+    """Write the derivatives of a vector by a rotation about each axis to N, (axis, state)."""
     if len(v) == 2:
         N[0, at], N[0, at + 1] = -v[1], v[0]
         return
@@ -155,7 +154,7 @@ def write_tangents(N, at, v):
 
 @allocating_kernel
 def make_functionals(N, idx, moved):
-    """Make ``(N N^T)^-1 N`` of N, which reads the rotation off an error; returns that of a move."""
+    """Replace N by ``(N N^T)^-1 N``, which gives the rotation in an error; return a move's."""
     n = len(N)
     inertia, w, column = np.zeros((n, n)), np.zeros(n), np.zeros(n)
     for r in idx:
@@ -178,7 +177,7 @@ def make_functionals(N, idx, moved):
 
 @small_kernel
 def retract(x, moved, at, centre, bend, v):
-    """Let a move go round a centre: what a rotation differs by from its tangent is added to it."""
+    """Add to a move about a centre the difference between a rotation and its tangent."""
     for k in range(3):
         v[k] = x[at + k] - moved[at + k] - centre[k]
     for k in range(3):

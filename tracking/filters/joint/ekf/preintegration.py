@@ -1,7 +1,7 @@
-"""Inertial samples: summed per node until a measurement comes, and watched for rest.
+"""Preintegration of inertial samples per node until a measurement comes, and rest detection.
 
-Between two STATE events the acceleration goes straight from one to the other; until the second
-comes, the first is held, and what that was wrong by is added then.
+Between two STATE events the acceleration is the mean of both; until the second comes, the first is
+held, and the difference is added then.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from tracking.measurements import ACCEL_NOISE
 
 @small_kernel
 def is_aided(c, node, t):
-    """True if a node has samples of its IMU."""
+    """True if a node has recent samples of its IMU."""
     return node.has_state and t - node.t_state <= c.imu_timeout
 
 
 @small_kernel
 def preintegrate(c, nodes, held, pre, i, t):
-    """Add what node i did until time t, with the acceleration it reported last."""
+    """Preintegrate node i until time t, with the acceleration it reported last."""
     node = nodes[i]
     dt = t - node.t_pre
     if dt <= 0.0:
@@ -61,7 +61,7 @@ def preintegrate(c, nodes, held, pre, i, t):
 
 @small_kernel
 def preintegrate_rotation(held, pre, i, dt, share):
-    """Add how node i was turned: that is what an offset of its accelerometer does."""
+    """Preintegrate the orientation of node i, the derivatives by its accelerometer offset."""
     w, x, y, z = held[i, 0], held[i, 1], held[i, 2], held[i, 3]
     rotation = (
         1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
@@ -76,7 +76,7 @@ def preintegrate_rotation(held, pre, i, dt, share):
 
 @small_kernel
 def process_attitude(c, nodes, held, pre, i, t, values, e, k):
-    """A new orientation and acceleration of node i, held until the next."""
+    """Process a new orientation and acceleration of node i, held until the next."""
     node = nodes[i]
     noise = values[e, k, ACCEL_NOISE]
     if node.has_state and (noise > 0.0 or node.accel_noise > 0.0):
@@ -94,7 +94,7 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
         node.t_oriented = t
     process_tilt_correction(node, pre, i, values, e, k, is_new)
     if not fresh and dt > 1e-4:
-        # The angle between two orientations, from the vector part of their quotient.
+        # Angle between two orientations: twice the distance of their quaternions.
         qw, qx, qy, qz = held[i, 0], held[i, 1], held[i, 2], held[i, 3]
         cosine = abs(w * qw + x * qx + y * qy + z * qz)
         angle = 2.0 * math.sqrt(max(2.0 * (1.0 - min(cosine, 1.0)), 0.0))
@@ -107,7 +107,7 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
     if node.levelled:
         a0, a1 = level(w, x, y, z, a0, a1, a2, cos_yaw, sin_yaw)
     if not fresh:
-        # The first sample was held; the mean of both is nearer to what happened.
+        # The first sample was held: its difference to the mean of both is added.
         half_v, half_p = 0.5 * dt, 0.25 * dt * dt
         pre[i, DV] += half_v * (a0 - held[i, 4])
         pre[i, DV + 1] += half_v * (a1 - held[i, 5])
@@ -127,7 +127,7 @@ def process_attitude(c, nodes, held, pre, i, t, values, e, k):
 
 @small_kernel
 def update_rest_detector(c, node, t, dt, accel, fresh):
-    """Note when a node last moved, by how much its acceleration varies and by its turning."""
+    """Update the running means of the acceleration of a node, and the time of its last motion."""
     if fresh:
         node.accel_mean = accel
         node.accel_var = c.rest_accel * c.rest_accel

@@ -1,14 +1,14 @@
-"""Dead reckoning: what inertial samples add up to is applied when a measurement comes.
+"""Dead reckoning: preintegrated inertial samples are applied when a measurement comes.
 
 With T the time since the last one, the sums ``dv = int a``, ``dp = int int a`` and, for a bias b
-that turns with the body by ``B``, ``Bv = int B``, ``Bp = int int B`` (`preintegration`) give
+that rotates with the body by ``B``, ``Bv = int B``, ``Bp = int int B`` (`preintegration`) give
 
     p += T v + R dp - R Bp b,    v += R dv - R Bv b,    R = rotation by the heading error
 
-exactly, for every hypothesis at once; the samples themselves cost next to nothing. What is turned
-about in space is in `attitude_coupling`. Bias, heading error and range errors decay towards zero
-(first-order Markov): the first two with time, the last with the way of both ends, so that they
-stay while no node moves.
+exactly, for every hypothesis at once, at hardly any cost per sample. `attitude_coupling` has the
+terms of bodies that rotate about all axes. Bias, heading error and range errors decay (first-order
+Markov): the first two with time, range errors with the distance both ends travel, so that they stay
+while no node moves.
 """
 
 from __future__ import annotations
@@ -51,18 +51,18 @@ from tracking.maths.exponentials import decay
 
 @kernel
 def predict(c, s, h, step, work):
-    """Carry hypothesis h over the summed time of every node; no update is pending from then on.
+    """Propagate hypothesis h over the preintegrated time; apply its pending updates.
 
-    What decays does so first, in the sweep over P that applies pending updates. What is added after
-    it goes by what is left.
+    Decay comes first, in the sweep over P that applies pending updates. Derivatives that are used
+    after it refer to the decayed states.
 
     Args:
         c: Coefficients.
         s: JointState of one environment.
         h: Hypothesis.
-        step: How long that is [s].
-        work: Room: `scale`, how much of a state's error stays; `step`, time and derivatives
-            of each node; `speed`.
+        step: Preintegrated time [s].
+        work: Workspace: `scale`, the share of a state's error that stays; `step`, time and
+            derivatives of each node; `speed`.
     """
     nodes, pairs, x, P = s.nodes, s.pairs, s.x, s.P
     scale, w, F, speed = work.scale, work.step, work.derivatives, work.speed
@@ -81,7 +81,7 @@ def predict(c, s, h, step, work):
         scale[at] = decay(way / c.fast_length)
         hidden = s.nlos[h, p]
         scale[at + 1] = decay(way * ((1.0 - hidden) / c.slow_length + hidden / c.nlos_bias_length))
-        scale[at + 1] *= s.bias_retention[h, p]  # as a way does that leaves so much
+        scale[at + 1] *= s.bias_retention[h, p]  # like additional distance
         x[h, at] *= scale[at]
         x[h, at + 1] *= scale[at + 1]
         x[h, at + 1] += (1.0 - scale[at + 1]) * hidden * c.nlos_bias
@@ -115,7 +115,7 @@ def predict(c, s, h, step, work):
 
 @small_kernel
 def propagate_state(c, node, pre, x, h, i, scale, w, speed):
-    """The states of node i, and the derivatives of the step, written to row i of w."""
+    """Propagate the states of node i; write the derivatives of the step to row i of w."""
     d, T = c.d, pre[i, DT]
     p, v, b, y = node.i_pos, node.i_vel, node.i_tilt_bias, node.i_heading
     psi = x[h, y]
@@ -169,13 +169,13 @@ def propagate_state(c, node, pre, x, h, i, scale, w, speed):
 
 @small_kernel
 def time_since_epoch(s, i):
-    """How much older than the sums of node i the states are [s]; 0 for a static node."""
+    """Return the preintegrated time of node i since that of the states [s]; 0 for a static node."""
     return 0.0 if s.nodes[i].static else s.preintegrated[i, DT]
 
 
 @small_kernel
 def displacement_since_epoch(c, s, h, i):
-    """What `propagate_state` would add to the position of node i, three numbers [m]."""
+    """Return the displacement that `propagate_state` would add to node i, three numbers [m]."""
     node, pre, x, T = s.nodes[i], s.preintegrated, s.x, s.preintegrated[i, DT]
     psi = x[h, node.i_heading]
     cos_r, sin_r = cosine_sine(psi)
@@ -197,19 +197,19 @@ def displacement_since_epoch(c, s, h, i):
 
 @small_kernel
 def moves(node):
-    """True for a node of the group that is not fixed."""
+    """True for a present node that is not static."""
     return node.present and not node.static
 
 
 @small_kernel
 def n_bias_states(node):
-    """How many states stand behind position and velocity of a node: bias, offset, heading."""
+    """Return the number of a node's states from bias to heading: bias, offset, heading."""
     return node.i_heading + 1 - node.i_tilt_bias
 
 
 @small_kernel
 def write_derivatives(d, node, w, i, F, scale):
-    """What position and velocity of node i gain by what is left of the states behind, to F."""
+    """Write to F the derivatives of position and velocity of node i by its decayed other states."""
     T, pc, ps = w[i, STEP_T], w[i, STEP_BIAS_P], w[i, STEP_BIAS_P + 1]
     vc, vs = w[i, STEP_BIAS_V], w[i, STEP_BIAS_V + 1]
     y = node.i_heading - node.i_tilt_bias
@@ -231,13 +231,13 @@ def write_derivatives(d, node, w, i, F, scale):
 
 @small_kernel
 def initial_tilt_variance(node, age):
-    """Variance of the bias that comes from an orientation of that age [s], which is new."""
+    """Return the variance of the bias from the tilt of an orientation of this age [s]."""
     return node.initial_tilt_speed2 / (max(age, 1.0) * max(age, 1.0))
 
 
 @small_kernel
 def add_noise(c, node, pre, P, h, i, scale, step):
-    """Process noise of one node: white acceleration, and what keeps the Markov parts alive."""
+    """Add the process noise of one node: white acceleration, and noise of its Markov states."""
     p = node.i_pos
     if node.static:
         for k in range(c.d):

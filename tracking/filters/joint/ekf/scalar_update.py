@@ -1,12 +1,12 @@
-"""The linear algebra of the joint filter: scalar measurements with few non-zero derivatives.
+"""Linear algebra of the joint filter: scalar measurements with few non-zero derivatives.
 
-A measurement is a list of states and derivatives, so that its cost is that of one sweep over
-the covariance. With the optimal gain ``K = PH / S`` the Joseph form reduces to
-``P - (PH)(PH)^T / S``; written with ``w = PH / sqrt(S)`` it is symmetric to the last bit.
+A measurement is a list of states and derivatives, so that its cost is that of one sweep over the
+covariance. With the optimal gain ``K = PH / S`` the Joseph form reduces to ``P - (PH)(PH)^T / S``;
+written with ``w = PH / sqrt(S)`` it is symmetric to the last bit.
 
-A covariance of many states does not fit the nearest cache, and a sweep over it costs more than
-the sums. So in larger groups corrections wait: the covariance is ``P - W^T W`` with one row of W
-each, and one sweep takes them all off before P is used for anything else (`flush_updates`).
+The covariance of many states does not fit the nearest cache, and a sweep over it costs more than
+the sums. So in larger groups updates are pending: the covariance is ``P - W^T W`` with one row of W
+each, and one sweep applies them all before P is used for anything else (`flush_updates`).
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from tracking.maths.covariance import apply_downdate, sum_rows
 
 @small_kernel
 def compute_pht(s, h, m, work):
-    """Write ``w = P H`` of hypothesis h to the scratch; returns ``H P H^T``.
+    """Write ``w = P H`` of hypothesis h to the workspace; return ``H P H^T``.
 
     Args:
         s: JointState of one environment.
         h: Hypothesis.
         m: Number of non-zero derivatives.
-        work: Room; `idx` and `val` hold their states and them.
+        work: Workspace; `idx` and `val` hold their states and values.
     """
     idx, val, w, share, W = work.idx, work.val, work.w, work.share, s.pending_updates
-    # Eight at a time, since each sum takes as long as all eight; rows beyond count for nothing.
+    # Eight rows at a time, since one takes as long as eight; rows beyond the last are not used.
     for q in range(0, s.n_pending[h], 8):
         v0, v1, v2, v3, v4, v5, v6, v7 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(m):
@@ -48,7 +48,7 @@ def compute_pht(s, h, m, work):
 
 @small_kernel
 def covariance(s, h, a, b):
-    """One element of the covariance of hypothesis h, pending updates included."""
+    """Return one element of the covariance of hypothesis h, pending updates included."""
     total = s.P[h, a, b]
     for q in range(s.n_pending[h]):
         total -= s.pending_updates[h, q, a] * s.pending_updates[h, q, b]
@@ -57,19 +57,19 @@ def covariance(s, h, a, b):
 
 @small_kernel
 def relative_covariance(P, h, i, j, a, b):
-    """Covariance of components a and b of a relative position, pending updates left out [m2]."""
+    """Return the covariance of axes a, b of a relative position, pending updates left out [m2]."""
     return P[h, i + a, i + b] + P[h, j + a, j + b] - P[h, i + a, j + b] - P[h, j + a, i + b]
 
 
 @small_kernel
 def relative_variance_bound(s, h, i, j, d):
-    """Upper bound of the summed variances of a relative position: pending updates lower it [m2].
+    """Return a bound of the trace of a relative position's covariance, which updates lower [m2].
 
     Args:
         s: JointState of one environment.
         h: Hypothesis.
         i: First state of one position.
-        j: Of the other.
+        j: First state of the other position.
         d: 2 or 3.
     """
     trace = relative_covariance(s.P, h, i, j, 0, 0) + relative_covariance(s.P, h, i, j, 1, 1)
@@ -78,7 +78,7 @@ def relative_variance_bound(s, h, i, j, d):
 
 @small_kernel
 def relative_variance_across(s, h, i, j, u0, u1, u2, d):
-    """Summed variances of a relative position across a direction u, pending updates off [m2]."""
+    """Return the trace of a relative position's covariance across u, with pending updates [m2]."""
     P, W = s.P, s.pending_updates
     trace = relative_variance_bound(s, h, i, j, d)
     along = u0 * u0 * relative_covariance(P, h, i, j, 0, 0)
@@ -88,7 +88,7 @@ def relative_variance_across(s, h, i, j, u0, u1, u2, d):
         across = u0 * relative_covariance(P, h, i, j, 0, 2)
         across += u1 * relative_covariance(P, h, i, j, 1, 2)
         along += u2 * (2.0 * across + u2 * relative_covariance(P, h, i, j, 2, 2))
-    # A sum for each axis: additions do not depend on each other.
+    # One sum per axis: additions do not depend on each other.
     t0, t1, t2 = 0.0, 0.0, 0.0
     for q in range(s.n_pending[h]):
         off0, off1, off2 = W[h, q, j] - W[h, q, i], W[h, q, j + 1] - W[h, q, i + 1], 0.0
@@ -104,7 +104,7 @@ def relative_variance_across(s, h, i, j, u0, u1, u2, d):
 def kalman_update(s, h, w, nu, S):
     """Correct hypothesis h with an innovation nu of variance S; w is ``P H``, overwritten.
 
-    What the states are moved by is added to `accumulated_correction`.
+    The correction of the states is added to `accumulated_correction`.
     """
     x, P, W, moved = s.x, s.P, s.pending_updates, s.accumulated_correction
     n, room = P.shape[2], W.shape[1]
@@ -132,10 +132,10 @@ def kalman_update(s, h, w, nu, S):
 
 @small_kernel
 def flush_updates(s, h):
-    """Apply pending updates: from here on P is the covariance of hypothesis h.
+    """Apply the pending updates of hypothesis h: afterwards P is its covariance.
 
-    Functions that read or write more of P than those of this module begin with it. Rare work
-    (`rare`, `supervise`) finds P whole.
+    Functions that use P beyond those of this module call it first. `rare` and `supervise` find no
+    pending updates.
     """
     if s.n_pending[h] > 0:
         apply_downdate(s.P, h, s.pending_updates, h, s.n_pending[h], None)
@@ -144,7 +144,7 @@ def flush_updates(s, h):
 
 @small_kernel
 def reset_state(s, h, n, at, variance):
-    """Forget what is known about one state: value 0, the given variance, no correlation."""
+    """Reset one state: value 0, the given variance, no correlation."""
     for r in range(n):
         s.P[h, at, r] = 0.0
         s.P[h, r, at] = 0.0
@@ -156,7 +156,7 @@ def reset_state(s, h, n, at, variance):
 
 @small_kernel
 def scale_state(s, h, n, at, share):
-    """Keep a share of what is known about one state and of its correlations."""
+    """Scale the covariances and sensitivities of one state; its value stays."""
     for r in range(n):
         s.P[h, at, r] *= share
         s.P[h, r, at] *= share
@@ -168,7 +168,7 @@ def scale_state(s, h, n, at, share):
 
 @small_kernel
 def symmetrise(P, h, n):
-    """Take out what rounding has made unequal across the diagonal."""
+    """Average P with its transpose, to remove rounding differences."""
     for r in range(n):
         for c in range(r + 1, n):
             mean = 0.5 * (P[h, r, c] + P[h, c, r])

@@ -1,4 +1,4 @@
-"""Room for the intermediate results of the joint filter's kernels."""
+"""Workspace: intermediate results of the joint filter's kernels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tracking.filters.joint.ekf.columns import N_PRE, N_STEP
 from tracking.filters.joint.state import room_to_wait
 from tracking.maths.covariance import ROOM, STATES
 
-# What is rare and large is compiled apart (`rare`). In the order in which a range needs them:
+# Rare actions, compiled apart (`rare`), in the order in which a range needs them:
 (
     NOTHING, TIME_OUT, SPAWN, STALE, SUPERVISED, TIME_OUT_LATER, MODES_STEP, SPLIT, REFLECT,
     CHALLENGE, REINITIALISE, START, JOIN, JOIN_OTHER, REMOVE,
@@ -22,52 +22,52 @@ ENV, EVENT, OUT, DONE, NODE, FLAG = range(6)
 
 
 class Workspace(NamedTuple):
-    """Room for intermediate results, so that most events allocate nothing."""
+    """Arrays for intermediate results, so that most events allocate nothing."""
 
     cursor: I64
-    """Where the loop over events goes on: environment, event, estimate, what of the event is done;
-    and of which node and how (6)."""
+    """State of the loop over events: environment, event, estimate, last action of the event; its
+    node and a flag of it (6)."""
 
     idx: I64
     """States of a measurement."""
     val: F64
-    """Derivatives by them."""
+    """Derivatives of a measurement by these states."""
     w: F64
-    """(state)"""
+    """``P H`` of a measurement, (state)."""
     share: F64
     """Weight of each pending update in a measurement, (update)."""
     scale: F64
-    """(state)"""
+    """Share of each state's error that stays in a step, (state)."""
     step: F64
     """The last step of each node, (node, N_STEP), see `columns`."""
     derivatives: F64
-    """Of position and velocity by the states behind, see `covariance`."""
+    """Derivatives of position and velocity by the other states of a node, see `covariance`."""
     speed: F64
-    """(node)"""
+    """Speed of each node, (node) [m/s]."""
     x: F64
     """States of an estimate, (1, state)."""
     P: F64
-    """Its covariance, (1, state, state)."""
+    """Covariance of an estimate, (1, state, state)."""
     preintegrated: F64
-    """Its sums, (node, N_PRE)."""
+    """Preintegrated samples of an estimate, (node, N_PRE)."""
     t_pre: F64
-    """(node) [s]"""
+    """Preintegration time of each node, saved during an estimate, (node) [s]."""
     nlos: F64
-    """(1, pair)"""
+    """NLOS probabilities of an estimate, (1, pair)."""
     bias_retention: F64
-    """(1, pair)"""
+    """Retained shares of slow range errors of an estimate, (1, pair)."""
     none_waiting: I64
-    """Number of its pending updates: zero, (1)."""
+    """Number of pending updates of an estimate: zero, (1)."""
     gradient: F64
-    """Of an innovation by the turn of an open group, (9)."""
+    """Derivatives of an innovation by the unknown rotation, (9)."""
     direct: F64
-    """Of a prediction by it, the states held, (9)."""
+    """Derivatives of a prediction by the unknown rotation with the states held, (9)."""
     turns: F64
-    """What reads a rotation of the group, its covariance, and moves turned, (3, axis, state)."""
+    """``A``, ``P A`` and ``G`` of `observability.shift_nullspace`, (3, axis, state)."""
 
 
 def make_workspace(n_nodes: int, n_pairs: int, n_states: int) -> Workspace:
-    """Room for a group of the given size."""
+    """Return the workspace of a group of the given size."""
     most = max(16, 3 * n_nodes)
     return Workspace(
         cursor=np.zeros(6, dtype=np.int64),

@@ -1,1 +1,1 @@
-"""Rotation and reflection of a group: the bank of hypotheses, what spawns them, alignment."""
+"""Rotation and reflection of a group: bank of hypotheses, initialisation, alignment."""

@@ -1,10 +1,10 @@
-"""Alignment of a group: what is known of its rotation and reflection, as a state machine.
+"""Alignment of a group: knowledge of its rotation and reflection, as a state machine.
 
 Ranges alone give the layout of a group up to a rotation and a reflection. `Alignment` says which
-filters stand for the rotations that are possible; `TRANSITIONS` lists every step between two of
-them and its cause. In the plane a bank of rotations is filtered from the first motion on; in space,
-with more than three nodes, one filter with linear sensitivities comes first
-(`alignment_sensitivity`), then a Gaussian sum of its modes (`alignment_modes`).
+filters represent the possible rotations; `TRANSITIONS` lists every transition between two states
+and its cause. In the plane a bank of rotations is filtered from the first motion on; in space, with
+more than three nodes, one filter with linear sensitivities comes first (`alignment_sensitivity`),
+then a Gaussian sum of its modes (`alignment_modes`).
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from tracking.records import Records
 
 
 class Alignment(IntEnum):
-    """State of a group, `GROUP.alignment`."""
+    """Alignment of a group, `GROUP.alignment`."""
 
     NONE = 0
     """The group is not initialised."""
     STATIC = 1
-    """No node has moved: one rotation stands for all."""
+    """No node has moved: one rotation represents all."""
     LINEAR = 2
-    """One filter with sensitivities to the rotation stands for all rotations."""
+    """One filter with sensitivities to the rotation represents all rotations."""
     CHALLENGED = 3
-    """As `LINEAR`, with a rotation that is reported until another one is clearly likelier."""
+    """As `LINEAR`, but a rotation is reported until another one is clearly likelier."""
     MODES = 4
     """Each hypothesis is a mode of the rotation, with sensitivities to rotations near it."""
     CANDIDATES = 5
-    """Each hypothesis is such a mode, its rotation a part of its covariance."""
+    """Each hypothesis is a mode whose rotation is a part of its covariance."""
     FILTERED = 6
     """The rotation is a part of the covariance of each hypothesis: of the bank, or the last one."""
 
@@ -72,10 +72,10 @@ TRANSITIONS: dict[Alignment, dict[Alignment, str]] = {
         Alignment.NONE: "fewer than two nodes are left",
     },
 }
-"""State to the states that follow it, and why."""
+"""State to its following states, with the cause of each."""
 
 ALLOWED = np.array([[b == a or b in TRANSITIONS[a] for b in Alignment] for a in Alignment])
-"""The same for kernels, (from, to)."""
+"""Allowed transitions for kernels, (from, to)."""
 
 # Plain numbers: kernels do not know enums.
 NONE, STATIC, LINEAR, CHALLENGED, MODES, CANDIDATES, FILTERED = (a.value for a in Alignment)
@@ -83,7 +83,7 @@ NONE, STATIC, LINEAR, CHALLENGED, MODES, CANDIDATES, FILTERED = (a.value for a i
 
 @small_kernel
 def set_alignment(group, to):
-    """Go on to a state. Steps that `TRANSITIONS` does not have are counted; tests find none."""
+    """Set the alignment of a group; count transitions that `TRANSITIONS` does not have."""
     if not ALLOWED[group.alignment, to]:
         group.n_illegal_steps += 1
     group.alignment = to
@@ -102,7 +102,7 @@ def has_modes(group):
 
 
 def freeze_alignment(group: Records) -> None:
-    """Take the reported hypothesis for the only one, in a copy of groups that is not reported.
+    """Make the best hypothesis the only one, in a copy of groups that is not reported.
 
     Args:
         group: GROUP, (env, 1), updated.

@@ -1,13 +1,13 @@
-"""Modes of the rotation of a group in space, each filtered by itself.
+"""Modes of the rotation of a group in space, each with its own filter.
 
-At first one filter stands for all rotations (`alignment_sensitivity`), and its frame is rotated to
-the likeliest mode ten times a second: that is reported. But headings and sensor offsets turn with
-the body, so their estimates are right for one rotation only, and so are the gains once either
-counts. So once each mode is known roughly, it is filtered in a frame of its own, by the likelihood
+At first one filter represents all rotations (`alignment_sensitivity`), and its frame is rotated to
+the likeliest mode ten times a second, which is reported. But headings and sensor offsets rotate
+with the body, so their estimates are right for one rotation only, and so are the gains once either
+matters. So once each mode is known roughly, it is filtered in a frame of its own, by the likelihood
 of later measurements, and follows the maximum near it: a Gaussian sum [1] over rotations. As long
-as all is linear its members have one covariance, so how well they fit decides between them, not
-how sure they are. Once all are known to a few degrees, the rest of the rotation error becomes a
-part of P, and frames are rotated no more.
+as all is linear its members have one covariance, so their fit decides between them, not their
+covariance. Once all are known to a few degrees, the remaining rotation error becomes a part of P,
+and frames are rotated no more.
 
 References:
     [1] Alspach and Sorenson, Nonlinear Bayesian estimation using Gaussian sum approximations, IEEE
@@ -50,9 +50,9 @@ from tracking.maths.rotation_modes import (
 
 @allocating_kernel
 def challenge_alignment(c, s, layout):
-    """Look for other turns of the only hypothesis; until one is likelier it stays as it is.
+    """Search for other rotations of the only hypothesis, which stays until one is likelier.
 
-    It has a head start, of which a mirror image feels all.
+    Other rotations start with a lower likelihood, mirror images by `challenger_penalty`.
     """
     h = s.group[0].best
     set_alignment(s.group[0], CHALLENGED)
@@ -65,10 +65,10 @@ def challenge_alignment(c, s, layout):
 
 @allocating_kernel
 def monitor_modes(c, s, layout):
-    """Turn frames to the likeliest turns, and go on with one for each once it is time."""
+    """Rotate frames to the likeliest rotations; follow each by itself once all are known."""
     group, was_alive = s.group[0], s.alive.copy()
     if group.t < group.t_scoring_starts - TIE:
-        # Nothing counts yet for or against any.
+        # No likelihood counts yet.
         set_alignment(group, LINEAR)
         for h in range(s.alive.shape[0]):
             if was_alive[h]:
@@ -85,14 +85,14 @@ def monitor_modes(c, s, layout):
 
 @allocating_kernel
 def resolve_challenge(c, s, layout):
-    """Give up a turn that is doubted once another is clearly likelier; keep it after a while."""
+    """Replace a challenged rotation once another is clearly likelier; keep it after a while."""
     group, R, H = s.group[0], np.eye(3), np.zeros((3, 3))
     value = climb_to_mode(s.alignment_information[group.best], s.alignment_score[group.best], R, H)
     turns, values = likely_modes(c, s, layout, group.best)
     if values[0] > value + c.challenger_lead:
         R[:], value = turns[0], values[0]
     if value < c.challenger_lead or is_near(R, np.eye(3), c.same_mode):
-        # A mode near it is measured by these seconds alone; the filter knows it better.
+        # A mode near it uses the data of the challenge only; the filter is more accurate.
         if len(values) == 1 or group.t - group.t_alignment > c.challenge_longest:
             set_alignment(group, FILTERED)
         return
@@ -102,7 +102,7 @@ def resolve_challenge(c, s, layout):
 
 @allocating_kernel
 def track_all_modes(c, s, layout):
-    """Turn every frame to the likeliest of all turns; part with them once each is known roughly."""
+    """Rotate every frame to its likeliest mode; spawn the modes once each is known roughly."""
     was_alive, known, H = s.alive.copy(), True, np.zeros((3, 3))
     for h in range(s.alive.shape[0]):
         if not was_alive[h]:
@@ -128,7 +128,7 @@ def track_all_modes(c, s, layout):
 
 @allocating_kernel
 def likely_modes(c, s, layout, h):
-    """The turns of hypothesis h that may be, (turn, 3, 3), and how likely, the likeliest first."""
+    """Return the likely modes of hypothesis h, (mode, 3, 3), and log-likelihoods, best first."""
     turns, values = find_modes(
         s.alignment_information[h], s.alignment_score[h], layout.rotations, c.same_mode
     )
@@ -140,9 +140,9 @@ def likely_modes(c, s, layout, h):
 
 @allocating_kernel
 def spawn_modes(c, s, h, turns, values):
-    """Follow hypothesis h in each of these turns, by so much likelier, while the bank has room."""
+    """Copy hypothesis h for each mode, with the mode's log-likelihood, while the bank has room."""
     for k in range(len(values)):
-        a = (k + 1) % len(values)  # itself last
+        a = (k + 1) % len(values)  # h itself last
         target = copy_hypothesis(s, h) if a > 0 else h
         if target >= 0:
             s.loglik[target] += values[a]
@@ -152,7 +152,7 @@ def spawn_modes(c, s, h, turns, values):
 
 @allocating_kernel
 def refine_modes(c, s):
-    """Turn every frame to the likeliest turn near it; hypotheses follow once all are known."""
+    """Rotate every frame to the mode near it; make them candidates once all are known."""
     known = True
     for h in range(s.alive.shape[0]):
         if s.alive[h]:
@@ -168,11 +168,11 @@ def refine_modes(c, s):
 
 @allocating_kernel
 def move_to_mode(c, s, h):
-    """Turn the frame of hypothesis h to the likeliest turn near it; true once that is known."""
+    """Rotate the frame of hypothesis h to the mode near it; return whether that is known."""
     g, w, H, J = np.zeros(9), np.zeros(3), np.zeros((3, 3)), small_rotation_derivatives()
     curvature(s.alignment_information[h], np.eye(3), s.alignment_score[h], w, H)
     known = least_curvature(H) > c.candidate_std**-2
-    # Only about axes of which more is known than which of the frames it is.
+    # Only about axes with more information than that of `mode_std`.
     values, axes = np.linalg.eigh(J @ (s.alignment_information[h] @ J.T.copy()))
     move = np.zeros(3)
     for a in range(3):
@@ -188,12 +188,12 @@ def move_to_mode(c, s, h):
 
 @allocating_kernel
 def rotate_frame(c, s, h, R):
-    """Turn the frame of hypothesis h so that the turn R becomes none."""
+    """Rotate the frame of hypothesis h so that the rotation R becomes the identity."""
     d = np.zeros(9)
     for k in range(9):
         d[k] = R[k // 3, k % 3] - (1.0 if k % 4 == 0 else 0.0)
     change = s.alignment_information[h] @ d
-    # M = R M': derivatives by the elements of the one from those by the other.
+    # M = R M': derivatives by the elements of M' from those by M.
     E = np.zeros((9, 9))
     for k in range(3):
         for r in range(3):
@@ -219,7 +219,7 @@ def rotate_frame(c, s, h, R):
 
 @allocating_kernel
 def add_mode_uncertainty(c, s, h):
-    """Add to P what is not known of the turn, which is the likeliest: none."""
+    """Add the uncertainty of the rotation, with its mode at the identity, to P of hypothesis h."""
     H = np.zeros((3, 3))
     climb_to_mode(s.alignment_information[h], s.alignment_score[h], np.eye(3), H)
     least = least_curvature(H)

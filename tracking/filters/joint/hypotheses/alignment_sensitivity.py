@@ -31,22 +31,22 @@ from tracking.maths.covariance import STATES
 from tracking.models.lever_arm import antenna_offset
 
 LOOSE = 3.0
-"""[-] Each element of M has a variance of a third, over all rotations."""
+"""[-] Prior information about each element of M: its variance over all rotations is a third."""
 
 
 @small_kernel
 def has_linear_alignment(c, s):
     """True for groups in space of more than three nodes (`rare.actions_of`).
 
-    Too little holds a layout of three. Those that start are few at first, the others join at once.
-    A smoother, which has no slopes, takes the turn as it is.
+    A layout of three has too little information. Few nodes start, the others join soon after. A
+    smoother, which has no sensitivities, keeps the rotation as it is.
     """
     return s.sensitivity.shape[1] > 0 and s.nodes.shape[0] > c.d
 
 
 @allocating_kernel
 def start_alignments(c, s, layout):
-    """Let one filter stand for all rotations from now on, if the group does not rest."""
+    """Start the alignment of every hypothesis, if the group is `LINEAR`."""
     if s.group[0].alignment == LINEAR:
         for h in range(s.alive.shape[0]):
             if s.alive[h]:
@@ -55,11 +55,11 @@ def start_alignments(c, s, layout):
 
 @allocating_kernel
 def start_alignment(c, s, layout, h):
-    """Forget what is known of the rotation of hypothesis h, which has no pending updates.
+    """Reset the information about the rotation of hypothesis h, which has no pending updates.
 
     The group is `LINEAR` or `CHALLENGED` already.
 
-    But that fixed nodes differ less in height than in width, where people put them.
+    The prior is that fixed nodes differ less in height than in width, as people place them.
     """
     s.alignment_score[h], s.alignment_information[h] = 0.0, 0.0
     attach_to_world(s, layout, h)
@@ -85,7 +85,7 @@ def start_alignment(c, s, layout, h):
 
 @allocating_kernel
 def update_alignment_cov(c, s, h):
-    """Work out how uncertain the elements of the turn are: those of any, or of one that is near."""
+    """Update the covariance of the elements of the rotation: of any, or of one near the mode."""
     if has_modes(s.group[0]):
         J = small_rotation_derivatives()
         H = J @ (s.alignment_information[h] @ J.T.copy()) + np.eye(3) / c.mode_std**2
@@ -96,7 +96,7 @@ def update_alignment_cov(c, s, h):
 
 @allocating_kernel
 def small_rotation_derivatives():
-    """Derivatives of the elements of a small turn by its three components, (3, 9)."""
+    """Return the derivatives of the elements of a small rotation by its components, (3, 9)."""
     J = np.zeros((3, 9))
     for a in range(3):
         u, v = (a + 1) % 3, (a + 2) % 3
@@ -106,7 +106,7 @@ def small_rotation_derivatives():
 
 @kernel
 def propagate_sensitivity(c, s, h, work):
-    """Carry the slopes over the step that `predict` has just made, and from which `work` is."""
+    """Propagate the sensitivities over the step that `predict` has just made with `work`."""
     first, last = c.n_motion, c.n
     for k in range(9):
         row, column = k // 3, k % 3
@@ -131,21 +131,21 @@ def propagate_sensitivity(c, s, h, work):
             if node.has_ahrs_feedback:
                 propagate_gyro_bias_sensitivity(node, z, work.step, i, work.scale)
                 z[b + row] += (w[TILT_STEP], w[TILT_STEP + 1], 0.0)[column]
-            # A turn by the heading error is one of M as well.
+            # The heading error and M rotate the same increments.
             z[p + row] += (w[BY_HEADING_P + 1], -w[BY_HEADING_P], w[UP_P])[column]
             z[v + row] += (w[BY_HEADING_V + 1], -w[BY_HEADING_V], w[UP_V])[column]
 
 
 @small_kernel
 def innovation_sensitivity(s, h, m, work):
-    """Write the derivatives of an innovation by the turn; returns the variance they add.
+    """Write the derivatives of an innovation by the rotation; return the variance they add.
 
     Args:
-        s: JointState of one environment, open.
+        s: JointState of one environment with sensitivities.
         h: Hypothesis.
         m: Number of derivatives by states.
-        work: Room; `idx` and `val` hold states and derivatives of what is predicted, `direct`
-            its derivatives by the turn with the states held; `gradient` is written.
+        work: Workspace; `idx` and `val` hold states and derivatives of the prediction, `direct`
+            its derivatives by the rotation with the states held; `gradient` is written.
     """
     g = work.gradient
     for k in range(9):
@@ -161,7 +161,7 @@ def innovation_sensitivity(s, h, m, work):
 
 @small_kernel
 def lever_arm_sensitivity(levers, work):
-    """Derivatives of a range by the turn, the positions held: only its antennas turn with M."""
+    """Write the derivatives of a range by M, positions held: the antennas rotate with it."""
     u, direct = work.val, work.direct
     for k in range(3):
         lever = levers[3 + k] - levers[k]
@@ -170,11 +170,11 @@ def lever_arm_sensitivity(levers, work):
 
 @small_kernel
 def attach_to_world(s, layout, h):
-    """Sensitivities of what was estimated while hypothesis h had its present rotation.
+    """Set the sensitivities of states that were estimated in the present rotation of hypothesis h.
 
-    Ranges measure where the antenna of a node is in the frame, whatever M is: its origin is an
-    offset away that turns with M. So does a bias of the accelerations, which is one of the world.
-    With both the same for all M, ranges and rest would measure a rotation that they do not observe.
+    Ranges measure the position of a node's antenna in the frame, whatever M is: the origin of the
+    node is an offset away that rotates with M. So does a bias of the accelerations, which is one of
+    the world. Without this, ranges and rest would measure a rotation that they do not observe.
     """
     s.sensitivity[h] = 0.0
     for i in range(s.nodes.shape[0]):
@@ -191,14 +191,14 @@ def attach_to_world(s, layout, h):
 
 @small_kernel
 def accumulate_alignment_information(s, h, work, nu, S):
-    """Add the information of an innovation of variance S, about to be used, on the rotation.
+    """Add score and information of the rotation from an innovation; update the sensitivities.
 
     Args:
-        s: JointState of one environment, open.
+        s: JointState of one environment with sensitivities.
         h: Hypothesis.
-        work: `w` is ``P H``, `gradient` as of `innovation_sensitivity`.
-        nu: The innovation.
-        S: Its variance, the turn known.
+        work: Workspace; `w` is ``P H``, `gradient` as of `innovation_sensitivity`.
+        nu: Innovation, not used yet for `kalman_update`.
+        S: Variance of the innovation with the rotation known.
     """
     g, w = work.gradient, work.w
     for k in range(9):

@@ -1,4 +1,4 @@
-"""The bank of hypotheses about rotation and reflection: which are added, which are kept.
+"""Bank of hypotheses about rotation and reflection: spawning, pruning, removal of nodes.
 
 A layout and its mirror image have the same ranges; motion distinguishes them. While the nodes pass
 through a line (or a plane, in space) the two coincide, and the filter may come out on the wrong
@@ -6,8 +6,8 @@ side. So the mirror image is filtered as well from there, until one is unlikely.
 
 A hypothesis whose ranges fit badly for seconds is rotated or reflected wrongly, by a start or join
 from few ranges: ranges alone fit any rotation, accelerations do not. Then all rotations and
-reflections compete again. So they do where no motion has shown for long how a group in the plane is
-turned, as in cars that drive one behind the other.
+reflections compete again. They also do if no motion has shown the rotation of a group in the plane
+for long, as with cars that drive one behind the other.
 
 References:
     [1] Alspach and Sorenson, Nonlinear Bayesian estimation using Gaussian sum approximations, IEEE
@@ -48,7 +48,7 @@ from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 @small_kernel
 def hypothesis_range(s):
-    """Hypotheses to go through: all, or the only one."""
+    """Return first and end index of the hypotheses to loop over: all, or the only one."""
     group = s.group[0]
     if group.n_alive > 1:
         return 0, s.alive.shape[0]
@@ -65,9 +65,9 @@ def flush_all_updates(s):
 
 @allocating_kernel
 def add_mirror_image(c, s):
-    """Make the mirror image of the reported hypothesis one, if the bank has room.
+    """Add the mirror image of the best hypothesis to the bank, if it has room.
 
-    It is mirrored across the line or plane that the layout is nearest to, velocities as well.
+    It is mirrored across the line or plane nearest to the layout, velocities as well.
     """
     h = s.group[0].best
     target = copy_hypothesis(s, h)
@@ -79,7 +79,7 @@ def add_mirror_image(c, s):
 
 @kernel
 def challenge(c, s, layout):
-    """Follow all rotations and mirror images again, and the only hypothesis."""
+    """Spawn all rotations and mirror images again, in competition with the only hypothesis."""
     group = s.group[0]
     h = group.best
     group.misfit_limit = c.challenge_raise * max(group.misfit, group.misfit_limit)
@@ -98,15 +98,15 @@ def challenge(c, s, layout):
 
 @allocating_kernel
 def split_rotation(c, s, layout, work):
-    """Follow all rotations and mirror images in place of one whose rotation is too uncertain.
+    """Replace a hypothesis with too uncertain a rotation by all rotations and mirror images.
 
-    A Gaussian so wide is no longer moved as its mean is: it becomes a sum of narrow ones [1], each
-    as uncertain as the gap between two. They are as likely as it says, but no less likely than by
-    `challenger_penalty`, like mirror images.
+    So wide a Gaussian does not move as its mean does: it becomes a sum of narrow ones [1], each
+    with the variance of a first rotation. They are as likely as its density says, but not less
+    likely than by `challenger_penalty`, like mirror images.
     """
     group, A = s.group[0], np.zeros(c.n)
     h = group.best
-    shift_nullspace(c, s, h, 1.0, work)  # by what moved lately
+    shift_nullspace(c, s, h, 1.0, work)  # by the latest corrections
     heading_functional(s, h, -1, A)
     w = s.P[h] @ A
     variance = A @ w
@@ -117,7 +117,7 @@ def split_rotation(c, s, layout, work):
 
 @kernel
 def needs_reflection(c, s):
-    """True where a layout was degenerate and no longer is: its mirror image is as likely."""
+    """True if a layout was degenerate and is regular again: its mirror image is as likely."""
     group = s.group[0]
     if group.n_alive != 1 or group.alignment < CANDIDATES:
         return False
@@ -144,7 +144,7 @@ def prune_bank(c, s):
     is_scored = group.alignment == STATIC or group.t >= group.t_scoring_starts - TIE
     best, changes = choose_best(s, c.report_lead if is_scored else np.inf)
     if changes:
-        # Residuals are those of the other hypothesis.
+        # Residuals were those of the other hypothesis.
         for p in range(s.pairs.shape[0]):
             reset_residuals(s.pairs[p])
         reset_group_residuals(group)
@@ -174,7 +174,7 @@ def prune_bank(c, s):
 
 @kernel
 def remove_node(c, s, layout, i):
-    """Forget a node that left."""
+    """Remove a node from the group, and all nodes if fewer than two remain."""
     node = s.nodes[i]
     node.present, node.seen = False, False
     node.fault = 0
@@ -210,13 +210,13 @@ def remove_node(c, s, layout, i):
 
 @kernel
 def has_timed_out(c, node, t):
-    """True for a node without a range for so long that it must have left."""
+    """True for a node that has had no range for `node_timeout`: it has left."""
     return (node.present or node.seen) and t - node.t_last_range > c.node_timeout
 
 
 @kernel
 def any_timed_out(c, s, t):
-    """True if a node has."""
+    """True if a node has timed out."""
     n = 0
     for i in range(s.nodes.shape[0]):
         n += has_timed_out(c, s.nodes[i], t)

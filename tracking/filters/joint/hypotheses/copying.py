@@ -8,7 +8,7 @@ from tracking.kernels.jit import allocating_kernel
 
 @allocating_kernel
 def copy_hypothesis(s, h):
-    """A copy of a hypothesis in a free place of the bank; -1 if there is none."""
+    """Copy a hypothesis to a free place of the bank; return its index, -1 if there is none."""
     for free in range(s.alive.shape[0]):
         if not s.alive[free]:
             s.alive[free] = True
@@ -31,7 +31,7 @@ def copy_hypothesis(s, h):
 
 @allocating_kernel
 def rotate_hypothesis(c, s, h, M):
-    """Turn or mirror the layout of a hypothesis about its centre, velocities as well.
+    """Rotate or reflect the layout of a hypothesis about its centre, velocities as well.
 
     Args:
         c: Coefficients.
@@ -51,7 +51,7 @@ def rotate_hypothesis(c, s, h, M):
 
 @allocating_kernel
 def rotate_block(s, n, h, at, mean, M):
-    """Turn one vector of the state about a mean, and its rows and columns of the covariance."""
+    """Rotate a vector of the state about a mean, and its rows and columns of the covariance."""
     d = M.shape[0]
     x, P, out = s.x, s.P, s.x[h, at : at + d] - mean
     for r in range(d):

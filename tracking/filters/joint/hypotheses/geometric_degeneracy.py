@@ -1,4 +1,4 @@
-"""Degeneracy of a layout: its extent across the line or plane that it is nearest to."""
+"""Degeneracy of a layout: its extent across the line or plane nearest to it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from tracking.kernels.jit import allocating_kernel
 
 @allocating_kernel
 def degeneracy_ratio(c, s, h, turns):
-    """Extent of the layout across itself over its standard deviation; infinite for few nodes.
+    """Return the least extent of the layout over its standard deviation; infinite for few nodes.
 
     Args:
         c: Coefficients.
         s: JointState of one environment.
         h: Hypothesis without pending updates.
-        turns: Whether an error that is a turn of the whole group counts. In space it may be large,
-            and makes the layout no flatter.
+        turns: True if errors that rotate the whole group count. In space they may be large, and
+            they make the layout no flatter.
     """
     d = c.d
     X, members = centred_positions(c, s, h)
@@ -24,8 +24,8 @@ def degeneracy_ratio(c, s, h, turns):
     if m <= d or not np.all(np.isfinite(X)):
         return np.inf
     squared, E = np.linalg.eigh(X.T.copy() @ X)
-    # What the error of the positions across the layout has in common is none of its extent; nor is
-    # what grows linearly along the layout, if turns do not count.
+    # A common error across the layout does not change its extent; nor does an error that grows
+    # linearly along the layout, a rotation.
     own = np.eye(m) - 1.0 / m
     if d == 3 and not turns and squared[1] * squared[2] > 1e-9 * (squared[1] + squared[2]) ** 2:
         for k in range(1, 3):
@@ -43,7 +43,7 @@ def degeneracy_ratio(c, s, h, turns):
 
 @allocating_kernel
 def least_axis(c, s, h):
-    """Direction across the line or plane that the layout is nearest to, (d)."""
+    """Return the direction across the line or plane nearest to the layout, (d)."""
     X, _ = centred_positions(c, s, h)
     _, E = np.linalg.eigh(X.T.copy() @ X)
     return E[:, 0].copy()
@@ -51,7 +51,7 @@ def least_axis(c, s, h):
 
 @allocating_kernel
 def centred_positions(c, s, h):
-    """Positions of the present nodes relative to their mean, (m, d), and these nodes, (m)."""
+    """Return positions of the present nodes about their mean, (m, d), and these nodes, (m)."""
     n, m = s.nodes.shape[0], 0
     X, members = np.empty((n, c.d)), np.empty(n, np.int64)
     for i in range(n):

@@ -1,9 +1,9 @@
 """Initialisation of a group, and of a node that joins it, from first ranges.
 
 A group starts with MDS on the medians of the newest ranges, once for every rotation and reflection
-of the bank; the covariance covers the gap between two rotations. While all nodes rest, one stands
-for all (`static_initialisation`). A node that joins is placed by least squares on its distances to
-the others, in every hypothesis; where those are too few or degenerate, both sides become
+of the bank; the covariance covers the gap between two rotations. While all nodes rest, one rotation
+represents all (`static_initialisation`). A node that joins is placed by multilateration with its
+distances to the others, in every hypothesis; if those are too few or degenerate, both sides become
 hypotheses.
 """
 
@@ -44,7 +44,7 @@ from tracking.models.range_bias import slow_error_var
 
 @kernel
 def can_start(c, s, layout, members, t):
-    """How many nodes can start, 0 for none; writes them."""
+    """Return the number of nodes that can start, 0 for none; write them to members."""
     m = choose_members(c, s, layout, members, t)
     return 0 if m == 0 or is_motion_unknown(c, s, members, m, t) else m
 
@@ -62,7 +62,7 @@ def start(c, s, layout, t):
         s.nodes[members[a]].present = True
         reset_preintegration(s, members[a], t)
     asleep = all_static(c, s, t)
-    # A smoother has room for one hypothesis; of what it starts nothing is reported.
+    # A smoother has room for one hypothesis; groups that it starts are not reported.
     opens = has_linear_alignment(c, s) and not asleep
     n_first = 1 if asleep or opens else min(layout.rotations.shape[0], s.alive.shape[0])
     for h in range(n_first):
@@ -111,8 +111,8 @@ def start(c, s, layout, t):
 def is_motion_unknown(c, s, members, m, t):
     """True while a node's samples are too few to show whether it moves.
 
-    Nodes at rest are followed in one rotation that stands for all; of nodes that move it would use
-    the accelerations in a wrong one.
+    Nodes at rest are filtered in one rotation that represents all; accelerations of moving nodes
+    would be used in a wrong one.
     """
     for a in range(m):
         node = s.nodes[members[a]]
@@ -123,7 +123,7 @@ def is_motion_unknown(c, s, members, m, t):
 
 @kernel
 def initialise_interval(pair, t):
-    """Initialise the interval of a pair that runs from here on, by its first ranges."""
+    """Initialise the mean interval of a pair that starts to run, from its first ranges."""
     n = min(pair.start_n, N_FIRST)
     first = pair.start_t[(pair.start_n - n) % N_FIRST]
     pair.interval = (t - first) / (n - 1) if n > 1 else 0.0
@@ -139,12 +139,12 @@ def reset_preintegration(s, i, t):
 
 @kernel
 def initialise_node(c, s, h, i, t):
-    """Velocity, bias and heading error of a node that nothing is known of yet."""
+    """Initialise velocity, biases, heading error and mount of node i in hypothesis h."""
     node = s.nodes[i]
     if node.static:
         return
     still = is_at_rest(c, node, t)
-    # What its compass reads where it stood when it was switched on counts less as it drives.
+    # The heading error of the place where it was switched on counts less as it drives.
     drove = max(node.t_moved - node.t_first - c.orienting, 0.0)
     stood = decay(drove / node.heading_tau)
     heading_var = node.heading_var + stood * (node.first_heading_var - node.heading_var)
@@ -170,7 +170,7 @@ def initialise_node(c, s, h, i, t):
 
 @kernel
 def initial_nlos_prob(c, pair):
-    """Probability that the first ranges of a pair had no line of sight, by their powers."""
+    """Return the NLOS probability of the first ranges of a pair, from their powers."""
     ratio = min(max(pair.start_nlos_llr, -c.first_powers_most), c.first_powers_most)
     odds = c.los_to_nlos_rate / c.nlos_to_los_rate * math.exp(ratio)
     return odds / (1.0 + odds)
@@ -178,7 +178,7 @@ def initial_nlos_prob(c, pair):
 
 @kernel
 def initialise_pair(c, s, h, p, hidden):
-    """Range errors that nothing is known of yet but how likely it is that there is no sight."""
+    """Initialise the range errors of pair p, whose NLOS probability is `hidden`."""
     s.nlos[h, p], s.bias_retention[h, p] = hidden, 1.0
     at = s.pairs[p].i_range_error
     if at >= 0:
@@ -190,7 +190,7 @@ def initialise_pair(c, s, h, p, hidden):
 
 @kernel
 def can_join(c, s, layout, new, ready, t):
-    """With how many others a node is ready to join them, 0 if too few; writes them."""
+    """Return the number of nodes that a new one is ready to join, 0 if too few; write them."""
     n = s.nodes.shape[0]
     n_present, n_ready = 0, 0
     for k in range(n):
@@ -204,7 +204,7 @@ def can_join(c, s, layout, new, ready, t):
 
 @allocating_kernel
 def join(c, s, layout, new, t):
-    """Take a node in that is ready with enough of the others."""
+    """Add a node that is ready with enough of the others."""
     n = s.nodes.shape[0]
     ready = np.empty(n, np.int64)
     n_ready = can_join(c, s, layout, new, ready, t)
@@ -235,15 +235,15 @@ def join(c, s, layout, new, t):
 
 @allocating_kernel
 def add_node(c, s, layout, h, new, pos, variance, t):
-    """Put a node at a position: its error is that of a body with the others, and its own.
+    """Add a node at a position, with the error of the others as a rigid body and its own.
 
-    Where the others are elsewhere, or rotated, it is as well: ranges to it measure neither.
+    If the others are displaced or rotated, so is the node: ranges to it measure neither.
     """
     initialise_node(c, s, h, new, t)
     d, n = c.d, s.nodes.shape[0]
     for k in range(d):
         reset_state(s, h, c.n, s.nodes[new].i_pos + k, 0.0)
-    # What reads the errors of the node, one row a coordinate, off those of the others.
+    # Error of the node from those of the others as a rigid body, one row per axis.
     J, A, present = np.zeros((d, c.n)), np.zeros(c.n), 0
     for i in range(n):
         present += s.nodes[i].present and i != new

@@ -14,19 +14,19 @@ from tracking.kernels.jit import allocating_kernel
 
 @allocating_kernel
 def are_same(c, s, a, b, turn):
-    """True when two hypotheses agree in position and velocity of every node round the centre.
+    """True if two hypotheses agree in position and velocity of every node about the centre.
 
-    Velocities count over one second: a layout and its mirror image may meet in a line, but
-    they go on to different sides.
+    Velocities count over one second: a layout and its mirror image may coincide in a line, but they
+    separate to different sides.
 
     Args:
         c: Coefficients.
         s: JointState of one environment.
         a: Hypothesis.
-        b: Another, turned before it is compared,
-        turn: by this, orthogonal, (d, d).
+        b: Another hypothesis, rotated by `turn` before the comparison.
+        turn: Orthogonal, (d, d).
     """
-    # Those that come from one filter, turned, are bent by that.
+    # Modes are rotated copies of one filter, with linearisation errors.
     limit = c.merge_distance * (2.0 if has_modes(s.group[0]) else 1.0)
     (way, pace), (way_a, pace_a) = group_centre(c, s, b), group_centre(c, s, a)
     for i in range(s.nodes.shape[0]):
@@ -49,12 +49,12 @@ def are_same(c, s, a, b, turn):
 
 @allocating_kernel
 def rotation_between(c, s, a, b, turn):
-    """Write how b is to be turned to be nearest to a, (d, d); leaves what is written if far.
+    """Write the rotation of b that is nearest to a, by Procrustes, (d, d), unless it is large.
 
-    Each rotation that was tried stands for those near it. Two of them that have come nearer than
-    `AlignmentParams.same_rotation` are one, before a drive shows which is better. While each
-    stands for all turns and mirror images, in space, it may be any of them; while each stands for
-    the turns near its own, those nearer than its peaks can be. By Procrustes.
+    Each rotation that was tried represents those near it. Two that differ by less than
+    `AlignmentParams.same_rotation` are one, before motion shows which is better. While each
+    represents all rotations and mirror images, in space, any rotation is written; while each is a
+    mode, one below `AlignmentParams.same_mode`.
     """
     (way_a, _), (way_b, _) = group_centre(c, s, a), group_centre(c, s, b)
     scatter = np.zeros((c.d, c.d))

@@ -1,6 +1,6 @@
 """Static initialisation: groups in which no node has moved yet.
 
-Ranges do not observe the rotation of a layout nor its reflection, and accelerations of nodes at
+Ranges observe neither the rotation of a layout nor its reflection, and accelerations of nodes at
 rest do not either: until something moves, all hypotheses of the bank are one, rotated. So one is
 filtered, and the others are spawned from it when the first node moves.
 """
@@ -20,12 +20,12 @@ from tracking.filters.joint.hypotheses.copying import copy_hypothesis, rotate_hy
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 TIE = 1e-6
-"""[s] Times that differ by less are equal, whatever the clock began with."""
+"""[s] Times that differ by less are equal, whatever the origin of the clock."""
 
 
 @small_kernel
 def is_at_rest(c, node, t):
-    """True for a node whose IMU has read the same for a while, up to now."""
+    """True for a node whose IMU has shown no motion for `rest_after`."""
     if not node.has_state or t - node.t_state > c.imu_timeout:
         return False
     return node.rests and t - node.t_moved > c.rest_after
@@ -50,7 +50,7 @@ def all_static(c, s, t):
 
 @small_kernel
 def may_move(c, s, t):
-    """True while it is too early to know whether the present nodes move."""
+    """True while samples of a present node are too few to show whether it moves."""
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
         if node.present and not node.static and is_settling(c, node, t):
@@ -60,7 +60,7 @@ def may_move(c, s, t):
 
 @small_kernel
 def is_settling(c, node, t):
-    """True until a node has a sample that tells whether it moves, or is silent."""
+    """True until a node has a sample that shows whether it moves, or is silent."""
     if t - node.t_first <= c.settling:
         return True
     return t - node.t_state <= c.imu_timeout and node.t_state - node.t_first <= c.settling
@@ -68,12 +68,12 @@ def is_settling(c, node, t):
 
 @allocating_kernel
 def spawn_rotation_hypotheses(c, s, layout, work):
-    """Follow all rotations and mirror images from now on.
+    """Spawn all rotations and mirror images, as the first node moves.
 
-    In space one filter follows all of them: its alignment is started next.
+    In space one filter represents all of them: its alignment is started next.
 
-    Where a node that joined may be on two sides there are two layouts; in the plane the bank has
-    room for a few rotations of the second.
+    If a joined node may be on two sides there are two layouts; in the plane the bank has room for a
+    few rotations of the second.
     """
     group = s.group[0]
     opens = has_linear_alignment(c, s)
@@ -85,7 +85,7 @@ def spawn_rotation_hypotheses(c, s, layout, work):
     for h in range(s.alive.shape[0]):
         for i in range(s.nodes.shape[0]):
             node = s.nodes[i]
-            # Errors of headings stay as long as no node moves.
+            # Heading errors are constant while no node moves.
             if was_alive[h] and node.present and not node.static:
                 reset_state(s, h, c.n, node.i_heading, node.first_heading_var)
         if was_alive[h]:
@@ -106,22 +106,22 @@ def spawn_rotation_hypotheses(c, s, layout, work):
 
 @kernel
 def reset_heading_uncertainty(c, s, h, work):
-    """Make hypothesis h as uncertain of how it is turned as the gap between two that are tried.
+    """Raise the rotation variance of hypothesis h to that of a first rotation, in the plane.
 
-    In space it is as uncertain as the start and ranges left it (`heading_gauge`).
+    In space it stays as the start and ranges left it (`gauge`).
     """
     if c.d == 2:
-        shift_nullspace(c, s, h, 1.0, work)  # by what moved lately
+        shift_nullspace(c, s, h, 1.0, work)  # by the latest corrections
         add_rotation_uncertainty(c, s, h, max(c.rotation_var - heading_variance(c, s, h), 0.0))
         s.group[0].heading_gauge_var = max(s.group[0].heading_gauge_var, c.rotation_var)
 
 
 @allocating_kernel
 def spawn_rotations(c, s, layout, original, variance):
-    """Follow a hypothesis in all other rotations and mirrored, while the bank has room.
+    """Copy a hypothesis in all other rotations and mirrored, while the bank has room.
 
     Each is less likely by its angle in a Gaussian of this variance [rad2], by `challenger_penalty`
-    at most, like mirror images; all are as likely where it is infinite.
+    at most, like mirror images; all are equally likely if it is infinite.
     """
     d = c.d
     first = layout.rotations[0, :d, :d].copy()

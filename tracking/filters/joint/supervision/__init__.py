@@ -1,1 +1,1 @@
-"""Detection of faults, and what is done about them."""
+"""Fault detection and fault handling."""

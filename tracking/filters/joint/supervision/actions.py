@@ -1,13 +1,13 @@
-"""What is done about a fault: one action for each of the catalogue (`faults.CATALOGUE`).
+"""Fault handling: one action for each fault of the catalogue (`faults.CATALOGUE`).
 
-A faulty node: an offset common to its ranges becomes a state. Its ranges then move the node and the
-offset and hardly the others.
+A faulty node: an offset common to its ranges becomes a state, so its ranges correct the node and
+the offset and hardly the other nodes.
 
 A node at a wrong position: after a start or a join from few ranges a node can settle on the wrong
-side of the others. Some of its ranges fit, the others hardly count, and it stays. In space it can
-also drift away by dead reckoning. It moves to where its ranges fit, or joins again.
+side of the others. Some of its ranges fit, the others hardly count, and it stays there. In space it
+can also drift away by dead reckoning. It moves to where its ranges fit, or joins again.
 
-The rotation of a group is for `hypotheses.bank.challenge`.
+The alignment is challenged in `hypotheses.bank.challenge`.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from tracking.maths.multilateration import best_position, total_loss
 
 @kernel
 def begin_node_fault(c, s, layout, i, fault, t):
-    """Note a fault of node i, and let the errors of its ranges move together."""
+    """Set the fault of node i, and activate the offset common to its ranges."""
     s.nodes[i].fault, s.nodes[i].t_fault = fault, t
     activate_node_bias(c, s, layout, i, c.offset_std**2)
 
 
 @kernel
 def follow_node_faults(c, s, layout, t):
-    """Process noise of faulty nodes' offsets; a fault ends a while after its statistic falls."""
+    """Add process noise to the offsets of faulty nodes; end faults whose statistic has fallen."""
     dt, worst = t - s.group[0].t_check, worst_node(c, s, layout, t)
     for i in range(s.nodes.shape[0]):
         node = s.nodes[i]
@@ -56,7 +56,7 @@ def follow_node_faults(c, s, layout, t):
 
 @kernel
 def activate_node_bias(c, s, layout, i, variance):
-    """Let the slow errors of all ranges of node i move together; none is for want of sight."""
+    """Add a common variance to the slow errors of all ranges of node i, and set them to NLOS."""
     n = s.nodes.shape[0]
     for h in range(s.alive.shape[0]):
         if not s.alive[h]:
@@ -74,14 +74,14 @@ def activate_node_bias(c, s, layout, i, variance):
 
 @allocating_kernel
 def reinitialise_node(c, s, layout, i, is_away, t):
-    """Move node i, in every hypothesis, to where its ranges fit much better, if there is such.
+    """Move node i to a position that its ranges fit much better, in each hypothesis with one.
 
-    One that is metres away joins again instead, on both sides of the others where that is open.
-    Ranges to others that are away as well do not count; where most that move are, the group starts
-    again.
+    If it has diverged (`is_away`), it is removed and joins again, on both sides of the others if
+    these are open. Ranges to others that have diverged do not count; if most moving nodes have, all
+    are removed and the group starts again.
 
     Returns:
-        True if anything was moved or removed.
+        True if a node was moved or removed.
     """
     n = s.nodes.shape[0]
     others, m, n_moving, n_away = np.empty(n, np.int64), 0, 0, 0
@@ -93,7 +93,7 @@ def reinitialise_node(c, s, layout, i, is_away, t):
             others[m] = k
             m += 1
     if is_away and c.n > c.n_own:
-        return False  # a smoother would lose the past that it holds
+        return False  # a smoother would lose the past states in its clones
     if is_away and (2 * n_away > n_moving or m < c.d):
         for k in range(n):
             again = 2 * n_away > n_moving and s.nodes[k].present and not s.nodes[k].static
@@ -124,7 +124,7 @@ def reinitialise_node(c, s, layout, i, is_away, t):
 
 @kernel
 def read_positions(c, s, h, i, others, known, pos):
-    """Positions of others into known (other, 3), and of node i into pos, in hypothesis h [m]."""
+    """Write positions of others to known (other, 3), and of node i to pos, in hypothesis h [m]."""
     for k in range(c.d):
         pos[k] = s.x[h, s.nodes[i].i_pos + k]
         for a in range(known.shape[0]):

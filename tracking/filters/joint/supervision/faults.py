@@ -1,9 +1,9 @@
 """Fault detection: a catalogue of faults, each with its statistic, its limit and its action.
 
-Once a period, the fault of a node or of the group whose statistic is most beyond its limit is acted
-on: statistics are squares over variances of the residuals (`residuals`), log-likelihood ratios as
-far as these are Gaussian. Faults of a link or of missing ranges need no comparison: they are
-decided with each range.
+Once a period, the fault of a node or of the group with the largest ratio of statistic to limit is
+acted on: statistics are squared residuals over variances (`residuals`), log-likelihood ratios as
+far as these are Gaussian. Faults of a link or of missing ranges are decided with each range,
+without comparison.
 """
 
 from __future__ import annotations
@@ -36,30 +36,30 @@ class Fault(IntEnum):
     BIAS = 1
     """All ranges of a node err alike: a wrong calibration, or an obstacle around it."""
     OUTLIERS = 2
-    """Most ranges of a node do not fit, those among the others do: random ranges."""
+    """Most ranges of a node are outliers, those among the others fit: random ranges."""
     POSITION = 3
     """Steady ranges of a node are too long and too short, and another position fits them all."""
     DIVERGED = 4
-    """In space: a node is metres from where its ranges have it."""
+    """In space: a node is metres from the position that its ranges fit."""
     ALIGNMENT = 5
     """The ranges of the group fit badly for seconds: it is rotated or reflected wrongly."""
     LINK = 6
     """The ranges of one pair contradict those of the other pairs."""
     GROUP = 7
-    """Ranges of the whole group are less likely than they should be: estimate or model is wrong."""
+    """Ranges of the whole group are less likely than expected: estimate or model is wrong."""
     FROZEN = 8
-    """A pair repeats one range while its ends travel."""
+    """A pair repeats one range while its nodes travel."""
     STALE = 9
-    """A node had no range until its distances to all others became uncertain."""
+    """A node had no range for so long that its distances to all others became uncertain."""
 
 
 class Remedy(NamedTuple):
-    """How a fault is decided, and the action."""
+    """Decision and action of a fault."""
 
     limit: str
-    """The parameter that its statistic is compared with, a field of `JointParams`."""
+    """Parameter that the statistic is compared with, a field of `JointParams`."""
     decided: str
-    """When: once a supervision period, or with each range."""
+    """Time of the decision: once a supervision period, or with each range."""
     action: str
 
 
@@ -98,7 +98,7 @@ CATALOGUE: dict[Fault, Remedy] = {
     ),
     Fault.STALE: Remedy("stale_std", RANGE, "the node joins again with its next range"),
 }
-"""Fault to how it is decided and the action."""
+"""Fault to its decision and action."""
 
 # Plain numbers: kernels do not know enums.
 NONE, BIAS, OUTLIERS, POSITION, DIVERGED, ALIGNMENT = (f.value for f in list(Fault)[:6])
@@ -106,14 +106,14 @@ NONE, BIAS, OUTLIERS, POSITION, DIVERGED, ALIGNMENT = (f.value for f in list(Fau
 
 @kernel
 def find_fault(c, s, layout, t, but_positions):
-    """The fault that is most beyond its limit, and the node; `NONE` and -1 where none is.
+    """Return the fault with the largest ratio to its limit, and the node; `NONE` and -1 if none.
 
     Args:
         c: Coefficients.
         s: JointState of one environment without pending updates.
         layout: Tables.
         t: Time [s].
-        but_positions: Whether wrong positions are left out.
+        but_positions: True to leave out wrong positions.
     """
     found, at, most = NONE, -1, 1.0
     ratio = alignment_ratio(c, s)
@@ -141,7 +141,7 @@ def find_fault(c, s, layout, t, but_positions):
 
 @kernel
 def worst_node(c, s, layout, t):
-    """The node with the largest share of outliers, -1 unless the others fit without it."""
+    """Return the node with the largest outlier ratio, -1 unless the ranges without it fit."""
     worst, most = -1, 0.0
     for i in range(s.nodes.shape[0]):
         if s.nodes[i].present:
@@ -153,16 +153,16 @@ def worst_node(c, s, layout, t):
 
 @kernel
 def bias_ratio(c, s, layout, i, t):
-    """Square of the error common to the ranges of node i over that of its limit; 0 for few."""
+    """Return n times the squared common error of node i's n pairs over its limit; 0 if n < 2."""
     n, error = common_range_error(c, s, layout, i, t)
     return n * (error / c.node_bias_limit) ** 2 if n >= 2 else 0.0
 
 
 @kernel
 def position_misfit(c, s, layout, i, t):
-    """What the ranges of node i say against its position, and whether most are metres off.
+    """Return the loss of node i's position by its ranges, and whether most are metres off.
 
-    Nothing where they are too few, or all too long, or too short, as by a wrong calibration.
+    The loss is 0 if its ranges are too few, or all too long or too short (a wrong calibration).
     """
     if s.nodes[i].static:
         return 0.0, False
@@ -174,7 +174,7 @@ def position_misfit(c, s, layout, i, t):
             least, greatest = min(least, error), max(greatest, error)
             n += 1
             n_far += has_large_residual(c, s.pairs[layout.pair_index[i, k]])
-    # In the plane a layout that is turned the wrong way looks like it, and is found as such.
+    # In the plane a wrongly rotated layout has the same residuals, and is found by its misfit.
     if c.d == 3 and n >= c.d and 2 * n_far > n and least < -c.far_residual:
         return total, True
     return total if n > c.d and least < -c.short_error and greatest > c.short_error else 0.0, False
@@ -182,7 +182,7 @@ def position_misfit(c, s, layout, i, t):
 
 @kernel
 def update_group_misfit(c, s, dt):
-    """Carry the group's misfit, and the limit that rises with each challenge, over dt [s]."""
+    """Update misfit and surprise of the group, and the limit that challenges raise, over dt [s]."""
     group = s.group[0]
     share = 1.0 - decay(dt / c.misfit_time)
     group.misfit += share * (group.mean_nis - group.misfit)
@@ -193,7 +193,7 @@ def update_group_misfit(c, s, dt):
 
 @kernel
 def alignment_ratio(c, s):
-    """Misfit of the only hypothesis over its limit; 0 where a node or the layout is to blame."""
+    """Return misfit over limit of the only hypothesis; 0 if a node or the layout explains it."""
     group, n_faulty = s.group[0], 0
     if group.n_alive != 1 or group.alignment < CANDIDATES or group.misfit < group.misfit_limit:
         return 0.0

@@ -1,8 +1,8 @@
 """Frozen ranges: a radio that repeats one number while its nodes move.
 
 Radios round to a millimetre or a centimetre, and some report every range twice, so a few equal
-ranges mean nothing; recordings that are rounded to a centimetre have runs of up to 11. Nodes at
-rest may repeat one for ever. But noise of several centimetres does not repeat while the ends move.
+ranges are no fault; recordings that are rounded to a centimetre have runs of up to 11. Nodes at
+rest may repeat one indefinitely. But noise of several centimetres does not repeat while they move.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from tracking.kernels.jit import small_kernel
 
 @small_kernel
 def is_frozen(c, s, p, t, distance):
-    """True if a range repeats what pair p has reported all along; notes it in any case.
+    """True if a range repeats the earlier ranges of pair p too often; counts it in any case.
 
-    It is ignored until another number comes, also when its nodes have left by then.
+    Such ranges are ignored until the number changes, also if the nodes have left by then.
     """
     pair = s.pairs[p]
     if distance != pair.last_range:
@@ -34,7 +34,7 @@ def is_frozen(c, s, p, t, distance):
 
 @small_kernel
 def certain_speed(c, s, node, t):
-    """Speed of a node in the best hypothesis [m/s]; 0 where it may stand."""
+    """Return the speed of a node in the best hypothesis [m/s]; 0 if it may be at rest."""
     if node.static or not node.present:
         return 0.0
     if is_at_rest(c, node, t):

@@ -1,4 +1,4 @@
-"""What decides that ranges, nodes or the whole group are wrong, and what is done then."""
+"""Thresholds for faults of ranges, nodes and groups, and for the alignment."""
 
 from __future__ import annotations
 
@@ -9,69 +9,67 @@ from tracking.params.checks import check_numbers
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SupervisionParams:
-    """Thresholds of the joint filter's supervision.
-
-    All are the authors' choice, on simulated runs, where no other source is given.
-    """
+    """Thresholds of supervision: the authors' choice on simulated runs, if no source is given."""
 
     nis_gain: float = 0.05
-    """[-] Weight of a range in the running means of a pair's NIS and outliers."""
+    """[-] Gain per range of a pair's mean NIS and outlier ratio; larger: faster, noisier."""
     group_nis_gain: float = 0.01
-    """[-] The same in that of all pairs."""
+    """[-] Gain per range of the group's mean NIS; larger: faster, noisier."""
     residual_gain: float = 0.1
-    """[-] The same of its residuals, which have to follow those who drift away."""
+    """[-] Gain per range of a pair's residuals, to follow nodes that drift; larger: noisier."""
     largest_nis: float = 25.0
-    """[-] A single range moves the mean NIS by no more; one that means nothing counts as this."""
+    """[-] Limit of a range's NIS in the mean NIS, and its value in that of a pair if it is not
+    accepted. Larger: outliers count more."""
     outlier_nis: float = 6.0
-    """[-] A range with a larger NIS does not fit, one in seventy."""
+    """[-] NIS from which on a range is an outlier, one in seventy; larger: fewer are."""
     surprise_limit: float = 1.2
-    """[-] Nothing of a group is ok while the mean surprise of its ranges over `misfit_time` is
-    larger; 0.5 is that of white noise alone."""
+    """[-] Mean surprise of a group's ranges over `misfit_time` above which no moving pair is `ok`;
+    0.5 is that of white noise alone. Larger: fewer groups are doubtful."""
     residual_clip: float = 1.0
-    """[m] A single range moves these means by no more."""
+    """[m] Limit of a range's deviation in residual statistics; larger: outliers count more."""
     fastest: float = 10.0
-    """[m/s] Ranges that change faster jump."""
+    """[m/s] Rate at which ranges change without a jump; larger: fewer jumps are counted."""
     missed_intervals: float = 3.0
-    """[-] Mean intervals without a range after which a pair or a node is silent."""
+    """[-] Mean intervals without a range after which a pair or node is silent; larger: later."""
     interval_gain: float = 0.1
-    """[-] Weight of an interval in its running mean."""
+    """[-] Gain per interval of the mean interval between ranges; larger: faster, noisier."""
     longest_interval: float = 5.0
-    """[s] A longer one counts as this."""
+    """[s] Limit of an interval in the mean interval; larger: long gaps raise it more."""
     stale_share: float = 0.5
-    """[-] Share of `JointParams.stale_std` squared, from which on a node that was silent starts
-    again: the line of sight at 2 m may be off by 20 degrees."""
+    """[-] Share of `JointParams.stale_std` squared: above it, variances of all distances of a
+    silent node make it join again; at 2 m its direction may err by 20 degrees. Larger: later."""
     outlier_ratio: float = 0.6
-    """[-] A node of whose ranges a larger share does not fit is faulty, if the others fit."""
+    """[-] Outlier ratio above which a node is faulty, if the others fit; larger: fewer are."""
     fault_hysteresis: float = 0.5
-    """[-] A fault lasts while its residual is above this share of its limit."""
+    """[-] Share of `JointParams.node_bias_limit` above which a fault lasts; larger: shorter."""
     fault_time: float = 2.0
-    """[s] And for so long after that."""
+    """[s] Time without its cause after which a fault ends; larger: it ends later."""
     offset_std: float = 0.7
-    """[m] Standard deviation of the range offset that a faulty node may have at first."""
+    """[m] First standard deviation of a faulty node's range offset; larger: it explains more."""
     offset_rate: float = 1.0
-    """[m/sqrt(s)] Process noise of that offset."""
+    """[m/sqrt(s)] Random walk of a faulty node's range offset; larger: it changes faster."""
     settled_ranges: float = 10.0
-    """[-] Ranges of a pair before its mean residual counts against a node's position."""
+    """[-] Ranges of a pair before its residual counts against a position; larger: later."""
     largest_scatter: float = 0.25
-    """[m] A pair whose residuals scatter more says nothing of it."""
+    """[m] Scatter of residuals below which a pair counts against a position; larger: more do."""
     far_residual: float = 1.5
-    """[m] A node most of whose residuals are larger, some of them negative, is somewhere else: no
-    obstacle shortens a range, and no calibration by so much."""
+    """[m] Residual beyond which a node has diverged, if most of its own are and one is negative:
+    obstacles do not shorten a range, calibrations err less. Larger: fewer nodes have."""
     largest_jump: float = 0.25
-    """[m] Such ranges change faster than `fastest` by less."""
+    """[m] Mean jump below which a residual beyond `far_residual` counts; larger: more do."""
     position_misfit: float = 24.0
-    """[-] Sum of a node's misfits from which on another position is looked for."""
+    """[-] Loss of a node's position above which another is searched; larger: fewer searches."""
     position_gain: float = 0.25
-    """[-] The other position has to bring the sum below this share."""
+    """[-] Share of that loss that the other position must stay below; larger: nodes move sooner."""
     frozen_ranges: float = 5.0
-    """[-] Equal ranges after the first that may be chance; recordings that are rounded to a
-    centimetre have runs of up to 11 at rest."""
+    """[-] Repeats of a range that may be chance; recordings that are rounded to a centimetre have
+    runs of up to 11 at rest. Larger: frozen ranges are found later."""
     frozen_distance: float = 0.3
-    """[m] Distance that both ends travel, over which a range cannot stay the same."""
+    """[m] Distance travelled by both ends that changes any range; larger: found later."""
     frozen_speed: float = 0.1
-    """[m/s] A slower node may be at rest."""
+    """[m/s] Speed up to which a node may be at rest; larger: frozen ranges are found later."""
     survey_nis: float = 6.6
-    """[-] A surveyed distance counts against a hypothesis above this NIS, one in a hundred."""
+    """[-] NIS above which a survey counts against a hypothesis, one in a hundred; larger: fewer."""
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -82,52 +80,53 @@ class AlignmentParams:
     """Thresholds for the rotation and reflection of a group."""
 
     settling: float = 0.5
-    """[s] The first samples of a node look like motion: its orientation is still being found."""
+    """[s] Time after a node's first sample in which accelerations are no motion, as its attitude
+    filter converges. Larger: groups start later."""
     orienting: float = 1.5
-    """[s] Rotation means nothing for so long."""
+    """[s] Time after the first sample in which angular rates are no motion; larger: found later."""
     wheels_after: float = 4.0
-    """[s] After a start in motion wheels do not count against a rotation for so long: velocities
-    are not known yet."""
+    """[s] Time after a start on wheels in which likelihoods do not count, as velocities are not
+    known yet. Larger: later decisions."""
     stood_for: float = 1.0
-    """[s] Unless the group has been at rest for so long."""
+    """[s] Rest after the start that ends `wheels_after`; larger: a longer rest is needed."""
     degenerate: float = 2.5
-    """[-] Least extent of a layout, in standard deviations, below which it is degenerate."""
+    """[-] Least extent of a layout over its error below which it is degenerate; larger: sooner."""
     regular: float = 4.0
-    """[-] Least extent above which it is no longer degenerate."""
+    """[-] Least extent over its error above which it is regular again; larger: later."""
     report_lead: float = 2.0
-    """[-] Log-likelihood by which another hypothesis has to lead to be reported."""
+    """[-] Log-likelihood by which another hypothesis must lead to be reported; larger: later."""
     same_rotation: float = 0.15
-    """[rad] Hypotheses that differ by a smaller rotation of the group alone are one."""
+    """[rad] Hypotheses that differ by a smaller rotation alone are merged; larger: fewer stay."""
     split_std: float = 0.25
-    """[rad] A hypothesis in the plane whose rotation is less certain is replaced by one for every
-    rotation and mirror image."""
+    """[rad] Rotation error above which a hypothesis in the plane is replaced by one for every
+    rotation and mirror image. Larger: fewer splits."""
     gauge_std: float = 0.05
-    """[rad] While the rotation is less certain, the null space is kept at every range."""
+    """[rad] Rotation error above which each range checks the null space; larger: cheaper."""
     misfit_time: float = 3.3
-    """[s] Time constant of a group's misfit, on which the alignment is challenged."""
+    """[s] Time constant of a group's misfit and surprise; larger: slower and steadier."""
     challenge_raise: float = 1.5
-    """[-] Factor on the misfit that begins another challenge after the first."""
+    """[-] Factor on the limit of the misfit by a challenge in the plane; larger: fewer follow."""
     challenge_time: float = 60.0
-    """[s] Time constant with which that limit returns to `JointStartParams.respawn_nis`."""
+    """[s] Time constant of the limit's return to `JointStartParams.respawn_nis`; larger: slower."""
     challenge_position: float = 0.2
-    """[m] Added standard deviation of positions on a challenge in the plane."""
+    """[m] Position error added by a challenge in the plane; larger: ranges correct it more."""
     challenge_speed: float = 0.5
-    """[m/s] Of velocities."""
+    """[m/s] Velocity error added by a challenge in the plane; larger: it is corrected more."""
     mode_lead: float = 1.0
-    """[-] Log-likelihood by which another mode has to lead to be reported."""
+    """[-] Log-likelihood by which another mode must lead to be reported; larger: later."""
     challenger_lead: float = 5.0
-    """[-] The same where a rotation was known and is challenged."""
+    """[-] Log-likelihood by which a mode must lead a challenged rotation; larger: fewer succeed."""
     challenge_longest: float = 20.0
-    """[s] A challenge ends after so long without a likelier mode."""
+    """[s] Time after which a challenge without a likelier mode ends; larger: it ends later."""
     same_mode: float = 0.3
     """[rad] Modes that differ by a smaller rotation are one; no rotation is that near a mirror
-    image."""
+    image. Larger: fewer modes."""
     mode_step: float = 0.02
-    """[rad] The frame is turned to its mode by no smaller a step."""
+    """[rad] Least rotation of a frame to its mode; larger: coarser, cheaper."""
     mode_std: float = 0.7
-    """[rad] Each mode is filtered by itself once it is known so well."""
+    """[rad] Rotation error of every mode below which each has its own filter; larger: sooner."""
     candidate_std: float = 0.15
-    """[rad] Its rotation goes into the covariance once it is known so well."""
+    """[rad] Rotation error of every mode below which it becomes part of P; larger: sooner."""
 
     def __post_init__(self) -> None:
         check_numbers(self)

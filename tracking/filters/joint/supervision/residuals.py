@@ -1,4 +1,4 @@
-"""Residual statistics: one store, running means for every pair and the group.
+"""Residual statistics: running means for every pair and the group.
 
 All are of the best hypothesis, and are reset when another becomes the best.
 """
@@ -12,24 +12,24 @@ from tracking.kernels.jit import kernel, small_kernel
 
 @small_kernel
 def reset_residuals(pair):
-    """Forget how well the ranges of a pair fit."""
+    """Reset the residual statistics of a pair."""
     pair.n_ranges, pair.mean_nis, pair.outlier_ratio = 0, 1.0, 0.0
     pair.mean_residual, pair.mean_abs_residual, pair.rate_violation = 0.0, 0.0, 0.0
 
 
 @small_kernel
 def update_residuals(c, s, p, dt, distance, nu, misfit, sane):
-    """Count a range of pair p.
+    """Update the residual statistics with a range of pair p.
 
     Args:
         c: Coefficients.
         s: JointState of one environment.
         p: Pair.
         dt: Time since its last range [s].
-        distance: The range [m].
-        nu: By how much it is longer than predicted [m].
-        misfit: Square of that over its variance [-].
-        sane: Probability that the range means anything.
+        distance: Range [m].
+        nu: Innovation [m].
+        misfit: Squared innovation over its variance [-].
+        sane: Probability that the range is no outlier.
     """
     pair, gain = s.pairs[p], c.nis_gain
     is_sane, nis = sane > c.least_sane, min(misfit, c.largest_nis)
@@ -50,7 +50,7 @@ def update_residuals(c, s, p, dt, distance, nu, misfit, sane):
 
 @small_kernel
 def count_surprise(s, pair, loglik):
-    """Count how likely a range of a pair was, unless a node of it is faulty."""
+    """Add the surprise of a range of a pair to the sum of its group, if neither node is faulty."""
     if s.nodes[pair.i].fault == 0 and s.nodes[pair.j].fault == 0:
         s.group[0].surprise_sum -= loglik + 0.5 * math.log(s.group[0].white_var)
         s.group[0].surprise_n += 1
@@ -61,7 +61,7 @@ def update_surprise(group, share):
     """Move the mean surprise of a group towards that of its ranges since the last update.
 
     Surprise is the negative log-likelihood of a range, in units of the white noise and without the
-    constant: 0.5 where ranges have that noise only.
+    constant: 0.5 for ranges with that noise only.
 
     Args:
         group: GROUP, updated.
@@ -74,14 +74,14 @@ def update_surprise(group, share):
 
 @small_kernel
 def reset_group_residuals(group):
-    """Forget how well the ranges of a group fit."""
+    """Reset the residual statistics of a group."""
     group.mean_nis, group.surprise = 1.0, 0.5
     group.surprise_sum, group.surprise_n = 0.0, 0
 
 
 @small_kernel
 def is_ranging(c, s, p, t):
-    """True if both nodes of pair p are there and it was ranged lately."""
+    """True if both nodes of pair p are present and it had a range lately."""
     pair = s.pairs[p]
     both = s.nodes[pair.i].present and s.nodes[pair.j].present
     waits = max(c.lost_after, c.missed_intervals * pair.interval)
@@ -90,7 +90,7 @@ def is_ranging(c, s, p, t):
 
 @kernel
 def node_outlier_ratio(c, s, layout, i, t):
-    """Mean share of outliers over the pairs of node i that range [-]."""
+    """Return the mean outlier ratio of the pairs of node i that range [-]."""
     total, n = 0.0, 0
     for k in range(s.nodes.shape[0]):
         if k != i and is_ranging(c, s, layout.pair_index[i, k], t):
@@ -101,7 +101,7 @@ def node_outlier_ratio(c, s, layout, i, t):
 
 @kernel
 def others_fit(c, s, i, t):
-    """True if pairs without node i range, and none of them contradicts the rest."""
+    """True if pairs without node i range, and none of them exceeds `pair_nis_limit`."""
     n = 0
     for p in range(s.pairs.shape[0]):
         pair = s.pairs[p]
@@ -114,10 +114,10 @@ def others_fit(c, s, i, t):
 
 @kernel
 def common_range_error(c, s, layout, i, t):
-    """How many others node i ranges with; the least error of those, 0 if signs differ [m]."""
+    """Return how many pairs of node i range, and their least error, 0 if signs differ [m]."""
     h, n, sign, least = s.group[0].best, 0, 0.0, math.inf
     for k in range(s.nodes.shape[0]):
-        # Surveyed distances between static nodes are not of their radios.
+        # Surveyed distances between static nodes are not measured by radio.
         if k == i or (s.nodes[i].static and s.nodes[k].static):
             continue
         p = layout.pair_index[i, k]
@@ -135,13 +135,13 @@ def common_range_error(c, s, layout, i, t):
 
 @small_kernel
 def has_large_residual(c, pair):
-    """True if plausible ranges have the ends of a pair metres from where they are."""
+    """True if the mean residual of a pair is beyond `far_residual` and its ranges are plausible."""
     return abs(pair.mean_residual) > c.far_residual and pair.rate_violation < c.largest_jump
 
 
 @small_kernel
 def is_informative(c, s, layout, i, k, t):
-    """True if nodes i and k have ranged with each other for a while, steadily."""
+    """True if nodes i and k have had enough ranges, with little scatter or a large residual."""
     p = layout.pair_index[i, k]
     pair = s.pairs[p]
     if not is_ranging(c, s, p, t) or pair.n_ranges < c.settled_ranges:
@@ -151,7 +151,7 @@ def is_informative(c, s, layout, i, k, t):
 
 @small_kernel
 def mean_range_error(c, s, p):
-    """By how much pair p lately ranges more than its distance [m], in the best hypothesis."""
+    """Return the recent mean of range minus distance of pair p, in the best hypothesis [m]."""
     pair, h = s.pairs[p], s.group[0].best
     if has_large_residual(c, pair):
         at_i, at_j, squared = s.nodes[pair.i].i_pos, s.nodes[pair.j].i_pos, 0.0

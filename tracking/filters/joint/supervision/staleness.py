@@ -1,11 +1,11 @@
-"""Stale nodes: without ranges for a while, and uncertain by now.
+"""Stale nodes: nodes without ranges for a while, whose distances have become uncertain.
 
 A second without measurements leaves a moving node a metre from its estimate, two seconds several.
-The linearisation of ranges to a position that is as wrong as it is far fails: the filter comes out
-reflected or rotated, and certain. So such a node joins again with its next range, and a group of
-such nodes starts again.
+With a position error as large as the distance the linearisation of ranges fails: the filter
+converges to a reflected or rotated layout with a small covariance. So such a node joins again with
+its next range, and a group of such nodes starts again.
 
-The criterion is the uncertainty of its distances, which no rotation of the group changes.
+The criterion is the variance of its distances, which no rotation of the group changes.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from tracking.filters.joint.hypotheses.bank import remove_node
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 SAME = 1e-5
-"""[s] Ranges of one message differ by their rounding only."""
+"""[s] Ranges of one message differ in time by rounding only."""
 
 
 @small_kernel
 def note_seen(c, node, t):
-    """Note that a node takes part in a range, and how often it does."""
+    """Set the time of a node's last range, and update its mean interval."""
     if node.seen:
         update_interval(c, node, t - node.t_last_range)
     node.seen, node.t_last_range = True, t
@@ -29,29 +29,29 @@ def note_seen(c, node, t):
 
 @small_kernel
 def update_interval(c, record, dt):
-    """Count a time between two ranges of a node or a pair [s]; those of one round are one."""
+    """Update the mean interval of a node or pair by a time [s]; ranges of one round count once."""
     if dt > SAME:
         record.interval += c.interval_gain * (min(dt, c.longest_interval) - record.interval)
 
 
 @small_kernel
 def is_silent(c, node, t):
-    """True for a node of the group that moves and had no range lately."""
+    """True for a moving node of the group that had no range lately."""
     waits = max(c.range_timeout, c.missed_intervals * node.interval)
     return node.present and not node.static and t - node.t_last_range > waits
 
 
 @allocating_kernel
 def drop_stale(c, s, layout, t):
-    """Remove all nodes that were silent and may be anywhere, as one of them has a range again.
+    """Remove all nodes that are silent and stale, as one of them has a range again.
 
-    Those that stay away would keep the others from starting again. The states are those of time
-    t, and no update is pending. A smoother looks no farther ahead than a silence lasts: what
-    it holds of the past would go with the group.
+    Those that remain silent would otherwise keep the others from starting again. The states are
+    those of time t, and no update is pending. A smoother, which looks ahead by less than a silence
+    lasts, removes none: its clones would go with the group.
     """
     if c.n > c.n_own:
         return
-    faded = np.zeros(s.nodes.shape[0], np.bool_)  # of all, before the first is gone
+    faded = np.zeros(s.nodes.shape[0], np.bool_)  # for all, before the first is removed
     for i in range(s.nodes.shape[0]):
         faded[i] = is_silent(c, s.nodes[i], t) and is_stale(c, s, i)
     for i in range(s.nodes.shape[0]):
@@ -61,7 +61,7 @@ def drop_stale(c, s, layout, t):
 
 @kernel
 def is_stale(c, s, i):
-    """True if the distances of node i to all others are open, in the reported hypothesis."""
+    """True if the distances of node i to all others are uncertain, in the best hypothesis."""
     h, at = s.group[0].best, s.nodes[i].i_pos
     for k in range(s.nodes.shape[0]):
         if k == i or not s.nodes[k].present:

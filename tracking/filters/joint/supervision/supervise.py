@@ -1,4 +1,4 @@
-"""Supervision of a group: who left, which hypotheses stay, what is at fault."""
+"""Supervision of a group: node timeouts, pruning of hypotheses, faults."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ from tracking.kernels.jit import kernel, small_kernel
 
 @kernel
 def supervise(c, s, layout, work, t, done):
-    """From time to time: who left, which hypotheses are worth their time, what is at fault.
+    """Supervise a group once a period: node timeouts, pruning and alignment, faults.
 
     Returns:
-        What has to be done elsewhere before it goes on, see `rare`.
+        Action that is due before supervision goes on, see `rare`.
     """
     flush_all_updates(s)
     if done < TIME_OUT_LATER and any_timed_out(c, s, t):
@@ -57,7 +57,7 @@ def supervise(c, s, layout, work, t, done):
     if done < CHALLENGE or is_helpless:
         if not is_helpless:
             update_group_misfit(c, s, t - s.group[0].t_check)
-        # Where no other position fits better, it is the ranges that are wrong.
+        # If no other position fits better, the ranges are wrong.
         fault, node = find_fault(c, s, layout, t, is_helpless)
         if fault == ALIGNMENT:
             return CHALLENGE
@@ -73,10 +73,10 @@ def supervise(c, s, layout, work, t, done):
 
 @small_kernel
 def needs_split(c, s, t):
-    """True where the only hypothesis of a group that has moved knows its rotation too badly.
+    """True if the only hypothesis of a group that has moved has too uncertain a rotation.
 
-    A node without ranges for a while may be anywhere, which says nothing of the rotation. A
-    smoother, which has no room for others, takes the rotation as it is.
+    Never with a silent node: its position is uncertain, which says nothing about the rotation.
+    Never in a smoother, which has one hypothesis only and keeps the rotation as it is.
     """
     group = s.group[0]
     if group.alignment != FILTERED or group.n_alive != 1 or c.n > c.n_own:
@@ -89,6 +89,6 @@ def needs_split(c, s, t):
 
 @kernel
 def update_heading_variance(c, s):
-    """Keep how uncertain the turn of the reported hypothesis is."""
+    """Update the variance of the rotation of the best hypothesis, in the plane."""
     if c.d == 2:
         s.group[0].heading_gauge_var = heading_variance(c, s, s.group[0].best)

@@ -21,15 +21,15 @@ from tracking.models.zero_velocity import zero_velocity_model
 
 @kernel
 def apply_motion_constraints(c, s, h, t, dt, work):
-    """Use what is known about the vehicles, in hypothesis h.
+    """Apply the motion constraints of all nodes to hypothesis h.
 
     Args:
         c: Coefficients.
         s: JointState of one environment, at time t.
         h: Hypothesis.
         t: Time [s].
-        dt: Time since the last use [s].
-        work: Room.
+        dt: Time since the last motion constraints [s].
+        work: Workspace.
     """
     constrain_nodes(c, s, h, t, work)
     mean_velocity_prior(c, s, h, dt, work)
@@ -37,7 +37,7 @@ def apply_motion_constraints(c, s, h, t, dt, work):
 
 @small_kernel
 def constrain_nodes(c, s, h, t, work):
-    """Nodes that rest do not move, and the axles of cars do not slide."""
+    """Apply ZUPTs to nodes at rest, and non-holonomic constraints to moving vehicles."""
     for r in range(c.n):
         work.x[0, r] = s.x[h, r]
     for i in range(s.nodes.shape[0]):
@@ -79,9 +79,9 @@ def update_gyro_bias_at_rest(s, h, i, work):
 
 @small_kernel
 def is_known_to_move(c, s, h, i):
-    """True if node i, whose IMU reads the same for a while, is known to move all the same.
+    """True if the velocity of node i is significant although its IMU looks at rest.
 
-    At a constant velocity, or slowly round a curve, an IMU reads what it reads at rest.
+    At a constant velocity, or in a slow curve, an IMU reads the same as at rest.
     """
     for k in range(c.d):
         at = s.nodes[i].i_vel + k
@@ -94,7 +94,7 @@ def is_known_to_move(c, s, h, i):
 
 @small_kernel
 def apply_constraint(c, s, h, nu, m, variance, work):
-    """Correct with a constraint, and let it speak for or against the hypothesis."""
+    """Correct hypothesis h with a constraint, and lower its likelihood by the NIS."""
     S, open_var = compute_pht(s, h, m, work) + variance, 0.0
     if is_linear(s.group[0]):
         open_var = innovation_sensitivity(s, h, m, work)
@@ -106,7 +106,7 @@ def apply_constraint(c, s, h, nu, m, variance, work):
 
 @small_kernel
 def nonholonomic_constraint(c, s, h, i, work):
-    """The rear axle moves sideways by the slip of its tyres only; wheeled nodes do not rise."""
+    """Constrain the rear axle's sideways velocity to tyre slip; in space also the climb to 0."""
     node, x = s.nodes[i], work.x[0]
     error = x[node.i_heading]
     cos_e, sin_e = math.cos(error), math.sin(error)
@@ -121,7 +121,7 @@ def nonholonomic_constraint(c, s, h, i, work):
         x[idx[0]], x[idx[1]], error, ahead, slip, cos_y, sin_y, node.yaw_rate, node.aside
     )
     nu, variance = -predicted, node.sideways_var
-    if m == 3:  # what is not known of it is noise
+    if m == 3:  # the uncertainty of the mount is noise
         variance += val[3] * val[3] * node.ahead_var + val[4] * val[4] * node.slip_var
     for k in range(m):
         nu -= val[k] * (s.x[h, idx[k]] - x[idx[k]])
@@ -137,7 +137,7 @@ def nonholonomic_constraint(c, s, h, i, work):
 
 @small_kernel
 def velocity_sensitivity(s, h, at, g0, g1, g2, work):
-    """Derivatives by the turn M of ``g . M^T v``, a velocity of the world, with v held."""
+    """Write the derivatives of ``g . M^T v``, a world velocity, by the rotation M with v held."""
     for r in range(3):
         v = s.x[h, at + r]
         work.direct[3 * r], work.direct[3 * r + 1] = g0 * v, g1 * v
@@ -146,9 +146,9 @@ def velocity_sensitivity(s, h, at, g0, g1, g2, work):
 
 @small_kernel
 def mean_velocity_prior(c, s, h, dt, work):
-    """The mean velocity of the moving nodes is that of things that are carried.
+    """Constrain the mean velocity of the moving nodes to 0, with the noise of their vehicles.
 
-    Once a second by weight: `dt` spreads it evenly.
+    The noise is that of one constraint a second: `dt` spreads it evenly.
     """
     m, variance = 0, 0.0
     for i in range(s.nodes.shape[0]):

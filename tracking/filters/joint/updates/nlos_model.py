@@ -1,8 +1,8 @@
-"""Whether the ends of a range see each other, and what follows from that for its slow error.
+"""NLOS probability of a pair, and its effect on the slow range error.
 
-It is judged by Bayes' rule, from the residual, from the gap between received and first-path power
-where it is reported, and from what it was before: a Markov chain of two states for every pair and
-hypothesis.
+It follows from Bayes' rule, with the innovation, with the difference of received and first-path
+power if these are reported, and with its earlier value: a Markov chain of two states for every pair
+and hypothesis.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from tracking.models.range_bias import slow_error_var
 
 @small_kernel
 def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
-    """Bayes' rule over what the sight was and is; updates the pair's NLOS probability.
+    """Update the NLOS probability of pair p by Bayes' rule over the states before and after.
 
-    The slow error holds the excess while there is no sight. So in sight before and after, or
-    in neither, the range is predicted as it is; entering adds an excess, leaving takes the
-    slow error away. Most obstacles add little, some a lot: so the excess has two parts.
+    The slow error holds the NLOS bias. So in LOS before and after, or in NLOS, the range is
+    predicted as it is; a transition to NLOS adds a bias, one to LOS removes the slow error. Most
+    biases are small, some are large: their density is a sum of two Gaussians.
 
     Args:
         c: Coefficients.
@@ -29,13 +29,13 @@ def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
         p: Pair.
         dt: Time since the pair's last range [s].
         nu: Innovation [m].
-        variance: Of the prediction [m2].
-        sight: As of `range_update`.
+        variance: Variance of the predicted range [m2].
+        sight: Evidence and rates of NLOS, see `range_update`.
         w: ``P H``.
 
     Returns:
-        Probability that the sight changed; that the range meant anything; likelihood; and
-        probability that the excess, if any came, is one of the large ones.
+        Probability of a transition; probability of no outlier; likelihood; and probability that
+        the bias after a transition to NLOS is a large one.
     """
     at = s.pairs[p].i_range_error + 1
     evidence, los_to_nlos_rate, nlos_to_los_rate, large_share = sight
@@ -56,7 +56,7 @@ def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
         stays,
         near + far,
         likelihood(nu_leave, S_leave),
-        # Without a state for the bias, NLOS is a range that is worse.
+        # Without a state for the bias, every NLOS range has a new one.
         stays if at > 0 else near + far,
         exponential(evidence),
     )
@@ -66,9 +66,9 @@ def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
 
 @small_kernel
 def reset_bias_on_transition(c, s, h, p, switched, is_far):
-    """Forget the slow error of a pair by the probability that its sight changed.
+    """Reset the slow error of a pair by the probability of an NLOS transition.
 
-    A new one is of the large ones with the probability `is_far`, a mixture taken for a Gaussian.
+    A new bias is a large one with probability `is_far`; the mixture is collapsed to one Gaussian.
     """
     at = s.pairs[p].i_range_error + 1
     if at <= 0:
@@ -83,6 +83,6 @@ def reset_bias_on_transition(c, s, h, p, switched, is_far):
     excess = c.nlos_bias + is_far * extra
     new_var = slow_error_var(c.slow_var, hidden, excess, nlos_bias_var)
     off = s.x[h, at] - hidden * excess
-    # Of the mixture of both; pending updates hold what has been taken off already.
+    # Variance of the mixture; pending updates, scaled above, remain subtracted.
     s.P[h, at, at] += switched * stays * before + switched * new_var + switched * stays * off * off
     s.x[h, at] -= switched * off

@@ -1,10 +1,10 @@
-"""The white noise of ranges is learned while they come, where it is more than at first.
+"""Learning of the white noise of ranges, from the value of the parameters upwards.
 
-Two ranges of a pair in a row differ by how the pair has moved, which is predicted, and by the
-difference of two white errors; what lasts is the same in both. Half of these differences are
-smaller than 0.67 times their standard deviation, whatever a few obstacles add. So each moves the
-estimate a small step up or down: the recursive median [1], from the noise of the parameters on. It
-does not depend on how much of an innovation the filter takes for a lasting error.
+Two successive ranges of a pair differ by the predicted motion of the pair and by the difference of
+two white errors; lasting errors cancel. Half of these differences are smaller than 0.67 times their
+standard deviation, whatever a few obstacles add. So each moves the estimate a small step up or
+down: the recursive median [1]. It does not depend on the share of an innovation that the filter
+assigns to a lasting error.
 
 References:
     [1] Robbins, Monro, A stochastic approximation method, Annals of Mathematical Statistics 22
@@ -19,25 +19,25 @@ from tracking.filters.joint.hypotheses.alignment import FILTERED
 from tracking.kernels.jit import small_kernel
 
 MEDIAN = 0.6745 * math.sqrt(2.0)
-"""[-] Median of the size of a difference of two white errors, over their standard deviation."""
+"""[-] Median absolute difference of two white errors, over the standard deviation of one."""
 
 
 @small_kernel
 def learns_noise(c, s):
-    """True where one hypothesis is left, whose residuals are those of the ranges."""
+    """True if noise is learned and one hypothesis is left, whose residuals are range errors."""
     return c.learns > 0.0 and s.group[0].alignment == FILTERED and s.group[0].n_alive == 1
 
 
 @small_kernel
 def learn_white_noise(c, group, pair, before, after, dt):
-    """Compare a range of a pair with its last one.
+    """Update the white noise by the difference of a range of a pair and its last one.
 
     Args:
         c: Coefficients.
         group: GROUP, `white_var` updated.
         pair: PAIR, updated.
-        before: By how much the range is longer than the distance predicted [m].
-        after: The same of the distance as the range has corrected it [m].
+        before: Range minus predicted distance [m].
+        after: Range minus distance corrected with the range [m].
         dt: Time since the last range of the pair [s].
     """
     if pair.has_residual and dt < c.white_gap:

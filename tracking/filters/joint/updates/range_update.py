@@ -2,11 +2,10 @@
 
     z = |p_j + l_j - p_i - l_i| + fast + slow + noise
 
-with the antenna offsets l turned by the nodes' orientations and heading errors, and p where the
-nodes are by now: the states may be a little older (`event_loop.predict_to`). Behind an
-obstacle an excess is added (`nlos_model`). The correction is that of both cases by their
-probabilities: information adds up, so a range that is surely hidden hardly counts. A few ranges
-mean nothing; one that fits neither case counts for nothing.
+with the antenna offsets l rotated by the nodes' orientations and heading errors, and p at the time
+of the range, predicted from states that may be a little older (`event_loop.predict_to`). NLOS adds
+a bias (`nlos_model`) and, in proportion to its probability, white noise. The noise is divided by
+the probability that the range is no outlier, so an outlier hardly counts.
 """
 
 from __future__ import annotations
@@ -38,25 +37,25 @@ from tracking.models.range import range_model
 from tracking.models.range_bias import range_bias_model
 
 NEGLIGIBLE = 1e-3
-"""[-] Share of the noise that is not worth working out."""
+"""[-] Share of the white variance up to which second-order variance is neglected."""
 
 
 @small_kernel
 def predict_range(c, s, h, p, lever_i, lever_j, idx, val):
-    """Predicted range of pair p [m] and its derivatives.
+    """Predict the range of pair p [m]; write its derivatives.
 
     Args:
         c: Coefficients.
         s: JointState of one environment.
         h: Hypothesis.
         p: Pair.
-        lever_i: Antenna of i relative to its node, as measured, 3 numbers [m].
-        lever_j: The same of j.
-        idx: States, written.
+        lever_i: Antenna of i relative to its node, world frame as measured, 3 numbers [m].
+        lever_j: Antenna of j relative to its node, world frame as measured, 3 numbers [m].
+        idx: States of the derivatives, written.
         val: Derivatives, written.
 
     Returns:
-        The range, and how many derivatives there are.
+        Range, and number of derivatives.
     """
     pair = s.pairs[p]
     node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
@@ -87,7 +86,7 @@ def predict_range(c, s, h, p, lever_i, lever_j, idx, val):
         idx[4], idx[5] = at_i + 2, at_j + 2
         val[4], val[5] = -u2, u2
         m = 6
-    # By biases and heading errors the way changes too, by less than a millimetre: left out.
+    # Derivatives of the displacement by biases and heading errors are left out: below 1 mm.
     for node, T, sign in ((node_i, T_i, -1.0), (node_j, T_j, 1.0)):
         if T > 0.0:
             idx[m], idx[m + 1] = node.i_vel, node.i_vel + 1
@@ -114,9 +113,9 @@ def predict_range(c, s, h, p, lever_i, lever_j, idx, val):
 
 @small_kernel
 def second_order_variance(c, s, h, p, val):
-    """Noise of a range that stands for the nonlinearity of its model [m2].
+    """Return the variance of a range that accounts for the nonlinearity of its model [m2].
 
-    A range is longer than predicted by ``tr(P_across) / (2 d)`` on average, to second order, with
+    To second order, a range is longer than predicted by ``tr(P_across) / (2 d)`` on average, with
     P_across the covariance of the relative position across the line of sight.
     """
     i, j = s.nodes[s.pairs[p].i].i_pos, s.nodes[s.pairs[p].j].i_pos
@@ -133,19 +132,19 @@ def second_order_variance(c, s, h, p, val):
 
 @small_kernel
 def lasting_error(s, h, p):
-    """What is taken for the lasting error of the ranges of a pair [m]."""
+    """Return the estimated lasting error of the ranges of a pair [m]."""
     at = s.pairs[p].i_range_error
     return s.x[h, at] + s.x[h, at + 1] if at >= 0 else 0.0
 
 
 @small_kernel
 def distance_covariance(s, p, variance, w):
-    """Covariance of a predicted range and the distance in it, its lasting errors left out [m2].
+    """Return the covariance of a predicted range and its distance without lasting errors [m2].
 
     Args:
         s: JointState of one environment.
         p: Pair.
-        variance: Of the range [m2].
+        variance: Variance of the range [m2].
         w: ``P H``.
     """
     at = s.pairs[p].i_range_error
@@ -162,16 +161,16 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         h: Hypothesis.
         p: Pair.
         dt: Time since the pair's last range [s].
-        distance: The range [m].
+        distance: Range [m].
         levers: Antennas of i and j relative to their nodes, six numbers [m].
-        sight: What its powers say of it: log-likelihood ratio of none, 0 where they are not
-            reported; how often it is lost, and regained [1/s]; share of large excesses.
-        work: Room.
+        sight: Log-likelihood ratio of NLOS from the powers, 0 if they are not reported; rates of
+            transitions to NLOS and to LOS [1/s]; share of large biases.
+        work: Workspace.
 
     Returns:
-        Innovation [m] and its square over the variance it was expected to have, its square over
-        the variance that the correction used; the probability that the range meant anything;
-        and the logarithm of its likelihood [m], but for a constant.
+        Innovation [m]; its square over the predicted variance; NIS with the noise after the NLOS
+        update; probability that the range is no outlier; log-likelihood of the range [m], without
+        a constant.
     """
     if s.group[0].heading_gauge_var > c.gauge_std * c.gauge_std:
         enforce_observability(c, s, h, work)
@@ -191,8 +190,8 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
     )
     loglik = math.log(likelihood)
     if s.group[0].n_alive > 1:
-        # Rotations and mirror images of one group are equally uncertain but for how far each was
-        # bent, and wrong ones, bent most, look surest: only how well they fit counts.
+        # Without determinants: covariances of hypotheses differ by linearisation errors only, and
+        # wrong ones, with the largest, have the smallest covariance.
         s.loglik[h] += max(loglik + 0.5 * math.log(S), -0.5 * c.nis_cap)
     before, misfit = nu, nu * nu / S
     if switched < c.reset_at_once or s.pairs[p].i_range_error < 0:
@@ -206,7 +205,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
             open_var = innovation_sensitivity(s, h, m, work)
     R = s.group[0].white_var + bent + s.nlos[h, p] * c.nlos_white_var
     nis = nu * nu / (variance + open_var + R)
-    # Ranges of a pair that have long contradicted all others count less and less.
+    # The larger the mean NIS of a pair, the less its ranges count.
     doubt = s.pairs[p].mean_nis / (c.contradiction_share * c.pair_nis_limit)
     trust = sane
     if doubt > 1.0:

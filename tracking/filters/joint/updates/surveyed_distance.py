@@ -1,7 +1,7 @@
-"""Surveyed distances: measured once, with a tape or a total station, and valid for good.
+"""Surveyed distances: measured once, with a tape or a total station, and valid permanently.
 
-One that is known before both of its nodes run shapes the start, which takes it for a range; so it
-is used once more when they do. It is kept while a node is away.
+One that is given before both of its nodes run is used as a range at the start, and once more when
+both run. It is kept while a node is away.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from tracking.kernels.jit import kernel, small_kernel
 def surveyed_distance_update(c, s, h, p, distance, is_news, work):
     """Correct hypothesis h with a surveyed distance between the origins of two nodes.
 
-    The same distance again says nothing new, so P stays: it takes back what linear corrections
-    have stretched since.
+    The same distance again (not `is_news`) adds no information, so P stays; the states are moved,
+    which removes the stretch of linear corrections since.
 
-    A hypothesis that puts a newcomer on the wrong side of the others loses likelihood by the
-    next of them, long before any node moves.
+    A hypothesis with a newly joined node on the wrong side of the others loses likelihood by its
+    next surveyed distance, long before any node moves.
     """
     if s.group[0].heading_gauge_var > c.gauge_std * c.gauge_std:
         enforce_observability(c, s, h, work)
@@ -51,7 +51,7 @@ def surveyed_distance_update(c, s, h, p, distance, is_news, work):
 
 @kernel
 def apply_surveys(c, s, layout, work, i, end):
-    """Correct with the surveyed distances of node i to those before `end` that are there."""
+    """Correct with the surveyed distances of node i to present nodes with indices below `end`."""
     for k in range(end):
         if k != i and s.nodes[i].present and s.nodes[k].present:
             p = layout.pair_index[i, k]
