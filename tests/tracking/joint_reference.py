@@ -45,7 +45,6 @@ class JointReference:
     """The core of the filter, started from the arrays of one running environment of `JointEkf`."""
 
     def __init__(self, coefficients: Any, state: Any, pair_index: Any) -> None:
-        """Copy the filter's state; `state` has no env axis and one hypothesis."""
         self.c, self.pair_index = coefficients, pair_index
         self.nodes, self.pairs = state.nodes.copy(), state.pairs.copy()
         self.group, h = state.group[0].copy(), int(state.group[0]["best"])
@@ -205,8 +204,8 @@ class JointReference:
 
         return predicted
 
-    def range(self, p: int, t: float, z: float, evidence: float, rates: Any) -> None:
-        """Correct with a range between two origins; `evidence` and `rates` depend on its powers."""
+    def range(self, p: int, t: float, z: float, evidence: float, rates: Any, share: float) -> None:
+        """Correct with a range between two origins; the last three depend on its powers."""
         c, pair, slow = self.c, self.pairs[p], int(self.pairs[p]["i_range_error"]) + 1
         if self.group["heading_gauge_var"] > c["gauge_std"] ** 2:
             self.follow()
@@ -219,8 +218,13 @@ class JointReference:
         leave_var = S + less + c["slow_var"]
         a, b = np.array(rates) / sum(rates) * -np.expm1(-sum(rates) * (t - pair["t_range"]))
         prior = np.array([[1.0 - self.nlos[p]], [self.nlos[p]]]) * [[1.0 - a, a], [b, 1.0 - b]]
-        enters = normal(nu - c["nlos_bias"], S + c["nlos_bias_var"])
-        like = [[normal(nu, S), enters], [normal(nu + self.x[slow], leave_var), normal(nu, S)]]
+        mean = np.array([c["nlos_bias"], c["nlos_bias_large"]])
+        var = np.array([c["nlos_bias_var"], c["nlos_bias_large_var"]])
+        enters = [1.0 - share, share] * np.array([normal(nu - mean[k], S + var[k]) for k in (0, 1)])
+        like = [
+            [normal(nu, S), enters.sum()],
+            [normal(nu + self.x[slow], leave_var), normal(nu, S)],
+        ]
         chance = prior * like * [1.0, np.exp(evidence)]
         total = chance.sum()
         switched = (chance[0, 1] + chance[1, 0]) / total
@@ -232,8 +236,10 @@ class JointReference:
         else:
             keep, old_var = np.ones(len(self.x)), self.P[slow, slow]
             keep[slow] = stays = 1.0 - switched
-            off, bias = self.x[slow] - hidden * c["nlos_bias"], c["nlos_bias"]
-            new_var = c["slow_var"] + hidden * (c["nlos_bias_var"] + (1.0 - hidden) * bias**2)
+            weight = enters / enters.sum()
+            bias, squared = weight @ mean, weight @ (var + mean**2)
+            off = self.x[slow] - hidden * bias
+            new_var = c["slow_var"] + hidden * (squared - hidden * bias**2)
             self.P *= np.outer(keep, keep)
             self.P[slow, slow] += switched * (stays * old_var + new_var + stays * off * off)
             self.x[slow] -= switched * off

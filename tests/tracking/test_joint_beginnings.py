@@ -14,7 +14,7 @@ from tracking.filters.joint.hypotheses.initialisation import (
     initialise_node,
     initialise_pair,
 )
-from tracking.filters.joint.params import JointParams, NlosParams
+from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.state import JointState, make_state
 from tracking.measurements import N_VALUES
 from tracking.records import as_records
@@ -81,7 +81,7 @@ def test_range_errors_begin_as_those_of_both_sights(evidence):
     s.pairs["start_nlos_llr"][0] = evidence
     hidden = initial_nlos_prob(c, s.pairs[0])
     initialise_pair(c, s, 0, 0, hidden)
-    at, p = s.pairs["i_range_error"][0] + 1, NlosParams()
+    at, p = s.pairs["i_range_error"][0] + 1, JointParams().nlos
     assert 0.0 < hidden < 1.0
     mean = hidden * p.nlos_bias
     squared = hidden * (p.nlos_bias**2 + p.nlos_bias_std**2)
@@ -92,7 +92,7 @@ def test_range_errors_begin_as_those_of_both_sights(evidence):
 
 def test_without_powers_sight_is_as_likely_at_first_as_it_is_in_the_long_run():
     c, s = one_env()
-    p = NlosParams()
+    p = JointParams().nlos
     assert initial_nlos_prob(c, s.pairs[0]) == pytest.approx(
         p.los_to_nlos_rate / (p.los_to_nlos_rate + p.nlos_to_los_rate)
     )

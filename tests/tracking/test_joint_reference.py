@@ -67,14 +67,16 @@ def follow(reference, block, first, last):
             reference.attitude(i, t, values[:4], values[4:7])
             continue
         evidence, rates = 0.0, (c["los_to_nlos_rate"], c["nlos_to_los_rate"])
+        share = c["nlos_large_share"]
         if block.has_power[0, k]:
             evidence = power_evidence(c.view(np.recarray), values[1] - values[2])
             rates = c["los_to_nlos_rate_with_power"], c["nlos_to_los_rate_with_power"]
+            share = c["nlos_large_share_with_power"]
         advance(reference, t)
         for node in (i, j):
             reference.integrate(node, t)
         check(reference, t)
-        reference.range(reference.pair_index[i, j], t, values[0], evidence, rates)
+        reference.range(reference.pair_index[i, j], t, values[0], evidence, rates, share)
 
 
 @pytest.mark.parametrize("powers", [False, True], ids=["ranges", "powers"])

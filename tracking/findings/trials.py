@@ -20,7 +20,7 @@ import numpy as np
 from tracking.ahrs.orientation import Orientation
 from tracking.arrays import F64, Bool
 from tracking.filters.joint import JointEkf
-from tracking.filters.joint.params import JointParams, NoiseLearningParams
+from tracking.filters.joint.params import JointParams, NlosParams, NoiseLearningParams
 from tracking.log.folder import Log
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.sanity.blocks import usable
@@ -36,7 +36,7 @@ PLAUSIBLE = -0.8
 with one range in seven an outlier; right sensors leave -2.7 to -1.1."""
 PARAMS = replace(
     JointParams(noise_learning=NoiseLearningParams(learns=False)),
-    nlos=replace(JointParams().nlos, nlos_bias_length=2.0),
+    nlos=NlosParams(nlos_bias_length=2.0),
     nlos_in_space=replace(JointParams().nlos_in_space, nlos_bias_length=2.0),
 )
 """Parameters without learned noise and lasting excess, which would explain faults."""

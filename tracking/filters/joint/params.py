@@ -96,7 +96,7 @@ class NlosParams:
 
 
 NLOS_IN_PLANE = NlosParams(
-    los_to_nlos_rate=0.2, nlos_to_los_rate=1.0, nlos_large_share=0.3, nlos_bias_length=10.0
+    los_to_nlos_rate=0.4, nlos_to_los_rate=2.0, nlos_large_share=0.3, nlos_bias_length=20.0
 )
 """Without powers, small biases cannot be separated from other range errors: only obstacles that
 last for a second and may add half a metre count."""
