@@ -64,25 +64,22 @@ class JointReference:
         self.integrate(i, t)
         R, dt = quat_to_matrix(q), t - node["t_state"]
         direction = R[:2, 0] / np.hypot(*R[:2, 0])
-        before = node["cos_yaw"] - 1j * node["sin_yaw"]
-        turn = np.angle(before * (direction[0] + 1j * direction[1]))
+        turn = np.angle((node["cos_yaw"] - 1j * node["sin_yaw"]) * (direction @ [1.0, 1j]))
         angle = 2.0 * np.sqrt(max(2.0 * (1.0 - min(abs(q @ held[:4]), 1.0)), 0.0))
         keep = decay(dt / self.c["yaw_rate_tau"])
         node["yaw_rate"] = keep * node["yaw_rate"] + (1.0 - keep) * turn / dt
         keep = decay(dt / self.c["rest_tau"])
         node["turning"] = keep * node["turning"] + (1.0 - keep) * angle / dt
-        accel = 1.0 * accel
         if node["levelled"]:
-            force = R.T @ (accel + [0.0, 0.0, GRAVITY])
+            accel, force = 1.0 * accel, R.T @ (accel + [0.0, 0.0, GRAVITY])
             yaw = np.array([[direction[0], -direction[1]], [direction[1], direction[0]]])
             accel[:2] = yaw @ force[:2]
         self.sums[i, 1:4] += 0.5 * dt * (accel - held[4:])
         self.sums[i, 4:7] += 0.25 * dt * dt * (accel - held[4:])
         if np.hypot(*accel[:2]) > node["impact_threshold"]:
             self.sums[i, 11] += (node["impact_noise_ratio"] * dt) ** 2 * (accel[:2] @ accel[:2])
-        held[:4], held[4:] = q, accel
+        held[:4], held[4:], node["t_state"] = q, accel, t
         node["cos_yaw"], node["sin_yaw"] = direction
-        node["t_state"] = t
         off = np.linalg.norm(accel) - node["accel_mean"]
         node["accel_mean"] += (1.0 - keep) * off
         node["accel_var"] = keep * node["accel_var"] + (1.0 - keep) * off * off
@@ -93,8 +90,7 @@ class JointReference:
     def integrate(self, i: int, t: float) -> None:
         """Integrate the last acceleration and the body's x axis until t."""
         node, s = self.nodes[i], self.sums[i]
-        dt = t - node["t_pre"]
-        node["t_pre"] = t
+        dt, node["t_pre"] = t - node["t_pre"], t
         axes = [node["cos_yaw"], node["sin_yaw"]] if node["levelled"] else [1.0, 0.0]
         for once, twice, a in ((s[1:4], s[4:7], self.held[i, 4:]), (s[7:9], s[9:11], axes)):
             twice += dt * once + 0.5 * dt * dt * np.array(a)
