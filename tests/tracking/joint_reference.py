@@ -49,10 +49,9 @@ class JointReference:
         self.nodes, self.pairs = state.nodes.copy(), state.pairs.copy()
         self.group, h = state.group[0].copy(), int(state.group[0]["best"])
         self.x, self.nlos = state.x[h].copy(), state.nlos[h].copy()
-        pending = state.pending_updates[h, : state.n_pending[h]]
-        self.P = state.P[h] - pending.T @ pending
+        W = state.pending_updates[h, : state.n_pending[h]]
+        self.P, self.stays = state.P[h] - W.T @ W, state.bias_retention[h].copy()
         self.moved = state.accumulated_correction[h].copy()
-        self.stays = state.bias_retention[h].copy()
         self.held, self.sums = state.last_attitude_accel.copy(), state.preintegrated.copy()
         self.i_pos = self.nodes["i_pos"][:, None] + [0, 1]  # (node, 2)
         names = ("i_pos", "i_vel", "i_tilt_bias", "i_heading")
