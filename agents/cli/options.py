@@ -86,6 +86,16 @@ def out_options(
     return add
 
 
+def log_out_options(command: Command) -> Command:
+    """Add `--out` for a log folder, and `--overwrite`, which replaces a log folder."""
+    for option in (
+        click.option("--overwrite", is_flag=True, help="Replace the log folder of --out."),
+        click.option("--out", type=Path, required=True, help="New or empty folder for the log."),
+    ):
+        command = option(command)
+    return command
+
+
 def jobs_options(text: str) -> Callable[[Command], Command]:
     """Return the options `--jobs`, `--engine` and `--address`.
 

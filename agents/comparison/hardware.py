@@ -1,4 +1,4 @@
-"""Comparison of drivers (controllers and policies) on real cars (`relpos compare --swarm`)."""
+"""Comparison of drivers (controllers and policies) on real cars (`relpos compare --config`)."""
 
 from __future__ import annotations
 

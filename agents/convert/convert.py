@@ -40,6 +40,7 @@ def convert(
     preset: str | None = None,
     mapping: Path | str | None = None,
     restamp: bool = False,
+    overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Log:
     """Read a recording and write it as a log folder.
@@ -50,6 +51,7 @@ def convert(
         preset: One of `PRESETS`.
         mapping: A mapping file, if there is no preset.
         restamp: Replace the times of IMU samples by those of a steady rate.
+        overwrite: Whether a log in that folder is replaced.
         progress: Called with the share of streams done, 0 to 1.
 
     Raises:
@@ -58,7 +60,7 @@ def convert(
     """
     plan = read_plan(preset, None if mapping is None else Path(mapping))
     if out is not None:
-        check_target(Path(out))
+        check_target(Path(out), overwrite=overwrite)
     path = Path(source)
     if not path.exists():
         raise UsageError(f"{path}: no such file or folder")
@@ -73,7 +75,7 @@ def convert(
     except ConfigError as error:
         raise UsageError(str(error)) from error
     if out is not None:
-        write_log(out, log)
+        write_log(out, log, overwrite=overwrite)
     return log
 
 

@@ -32,6 +32,7 @@ def simulate(
     channel: str | None = None,
     antenna_delay: float | None = None,
     out: Path | str | None = None,
+    overwrite: bool = False,
     progress: Progress | None = None,
 ) -> Log:
     """Simulate driven cars or an exercising person, and record the measurements of the trackers.
@@ -46,6 +47,7 @@ def simulate(
         antenna_delay: Standard deviation of the range offset of each antenna [m], for calibration
             recordings; by default that of the scenario.
         out: Path of the log folder; None writes nothing.
+        overwrite: Whether a log in that folder is replaced.
         progress: Called with the share done, 0 to 1.
 
     Raises:
@@ -57,7 +59,7 @@ def simulate(
     if seed < 0:
         raise EnvError(f"seed: expected 0 or more, got {seed}")
     if out is not None:
-        check_target(Path(out))
+        check_target(Path(out), overwrite=overwrite)
     chosen = recordable(scenario)
     chosen = replace(chosen, radio=_radio(chosen.radio, channel, antenna_delay))
     if isinstance(chosen, HumanScenario):
@@ -74,7 +76,7 @@ def simulate(
             place += f", antenna delays {antenna_delay:g} m"
         log = replace(log, source=f"{log.source}, {place}")
     if out is not None:
-        write_log(out, log)
+        write_log(out, log, overwrite=overwrite)
     return log
 
 

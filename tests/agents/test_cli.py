@@ -17,7 +17,7 @@ from tracking.filters import FILTERS
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     out = tmp_path_factory.mktemp("sim") / "run"
-    done = relpos("simulate", out, "--seconds", 20, "--seed", 3, "--json")
+    done = relpos("simulate", "--out", out, "--seconds", 20, "--seed", 3, "--json")
     assert done.returncode == 0, done.stderr
     record = json.loads(done.stdout)
     assert record["nodes"] == 3
@@ -178,15 +178,15 @@ FAULTS = [
     ),
     (["track", ".", "--skip", "-1"], "--skip"),
     (["track", "."], "no meta.toml"),
-    (["simulate", "x", "--scenario", "moon"], "scenario: expected one of"),
-    (["simulate", "x", "--cars", "1"], "cars: expected 2 to 20"),
-    (["simulate", "x", "--cars", "19"], "n_cars: 19 do not fit"),
-    (["simulate", "x", "--scenario", "moon.toml"], "scenario: cannot read 'moon.toml'"),
-    (["simulate", "x", "--seconds", "nan"], "seconds: expected 3 to 86400"),
-    (["simulate", "x", "--seed", "-4"], "seed: expected 0 or more"),
-    (["simulate", "x", "--cars", "two"], "--cars"),
-    (["simulate", "x", "--channel", "moon"], "channel: expected one of"),
-    (["simulate", "x", "--antenna-delay", "-1"], "antenna delay: expected 0 to 10"),
+    (["simulate", "--out", "x", "--scenario", "moon"], "scenario: expected one of"),
+    (["simulate", "--out", "x", "--cars", "1"], "cars: expected 2 to 20"),
+    (["simulate", "--out", "x", "--cars", "19"], "n_cars: 19 do not fit"),
+    (["simulate", "--out", "x", "--scenario", "moon.toml"], "scenario: cannot read 'moon.toml'"),
+    (["simulate", "--out", "x", "--seconds", "nan"], "seconds: expected 3 to 86400"),
+    (["simulate", "--out", "x", "--seed", "-4"], "seed: expected 0 or more"),
+    (["simulate", "--out", "x", "--cars", "two"], "--cars"),
+    (["simulate", "--out", "x", "--channel", "moon"], "channel: expected one of"),
+    (["simulate", "--out", "x", "--antenna-delay", "-1"], "antenna delay: expected 0 to 10"),
     (["protocol", "--events", "0"], "--events: expected 1 to 100000"),
     (["protocol", "--nodes", "3,x"], "--nodes: expected numbers"),
     (["protocol", "--nodes", "1"], "--nodes: expected 2 to 62"),
@@ -236,7 +236,7 @@ def test_results_are_whole_or_not_at_all(recording, tmp_path):
     (tmp_path / "file").write_text("")
     for args in (
         ["track", recording, "--out", tmp_path / "file" / "x"],
-        ["simulate", tmp_path / "file" / "x", "--seconds", 4],
+        ["simulate", "--out", tmp_path / "file" / "x", "--seconds", 4],
     ):
         done = relpos(*args)
         assert done.returncode == 2
@@ -285,7 +285,9 @@ def small_room(tmp_path):
 
 
 def test_a_scenario_of_ones_own(small_room, tmp_path):
-    done = relpos("simulate", tmp_path / "run", "--scenario", small_room, "--seconds", 5, "--json")
+    done = relpos(
+        "simulate", "--out", tmp_path / "run", "--scenario", small_room, "--seconds", 5, "--json"
+    )
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["nodes"] == 4
     done = relpos(
@@ -298,7 +300,9 @@ def test_a_scenario_of_ones_own(small_room, tmp_path):
 
 @pytest.mark.parametrize("scenario", ["random", "gap"])
 def test_simulate_takes_every_kind_of_scenario(scenario, tmp_path):
-    done = relpos("simulate", tmp_path / "run", "--scenario", scenario, "--seconds", 5, "--json")
+    done = relpos(
+        "simulate", "--out", tmp_path / "run", "--scenario", scenario, "--seconds", 5, "--json"
+    )
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["ranges"] > 0
 
@@ -344,7 +348,7 @@ def test_every_command_that_writes_results_knows_overwrite():
 
 def test_simulate_does_not_overwrite(recording):
     before = sorted((p.name, p.stat().st_mtime_ns) for p in recording.iterdir())
-    done = relpos("simulate", recording, "--seconds", 5)
+    done = relpos("simulate", "--out", recording, "--seconds", 5)
     assert done.returncode == 2
     assert "exists already" in done.stderr
     assert sorted((p.name, p.stat().st_mtime_ns) for p in recording.iterdir()) == before
@@ -352,7 +356,10 @@ def test_simulate_does_not_overwrite(recording):
 
 def test_simulate_is_repeatable(tmp_path):
     for name in ("a", "b"):
-        assert relpos("simulate", tmp_path / name, "--seconds", 5, "--seed", 8).returncode == 0
+        assert (
+            relpos("simulate", "--out", tmp_path / name, "--seconds", 5, "--seed", 8).returncode
+            == 0
+        )
     for file in ("ranges.csv.gz", "imu.csv.gz", "truth.csv.gz", "meta.toml"):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 

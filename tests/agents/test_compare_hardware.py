@@ -224,12 +224,12 @@ def command(monkeypatch, capsys, *args):
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (["--arm"], "--arm: expected together with --swarm"),
-        (["--swarm", "cars.toml", "--arm", "--jobs", "2"], "--jobs: expected without --swarm"),
-        (["--swarm", "cars.toml", "--task", "ring"], "--task: expected without --swarm"),
-        (["--swarm", "cars.toml", "--first-seed", "7"], "--first-seed: expected without --swarm"),
-        (["--swarm", "cars.toml", "--arm"], "--arm: expected a terminal, on which space stops"),
-        (["--swarm", "cars.toml"], "--arm: a comparison needs cars that move"),
+        (["--arm"], "--arm: expected together with --config"),
+        (["--config", "cars.toml", "--arm", "--jobs", "2"], "--jobs: expected without --config"),
+        (["--config", "cars.toml", "--task", "ring"], "--task: expected without --config"),
+        (["--config", "cars.toml", "--first-seed", "7"], "--first-seed: expected without --config"),
+        (["--config", "cars.toml", "--arm"], "--arm: expected a terminal, on which space stops"),
+        (["--config", "cars.toml"], "--arm: a comparison needs cars that move"),
     ],
     ids=" ".join,
 )
@@ -252,7 +252,7 @@ def test_the_command_compares_on_cars(monkeypatch, capsys, tmp_path):
 
     monkeypatch.setattr(hardware, "Bridge", opens)
     monkeypatch.setattr(keys, "check_stop_source", lambda source: None)  # as on a terminal
-    args = ["--swarm", str(tmp_path / "swarm.toml"), "--arm", "--episodes", "1"]
+    args = ["--config", str(tmp_path / "swarm.toml"), "--arm", "--episodes", "1"]
     args += ["--seconds", "1", "--settle", "0.5", "--json", "--out", str(tmp_path / "out")]
     monkeypatch.setattr(sys, "argv", ["relpos", "compare", "consensus", *args])
     main()

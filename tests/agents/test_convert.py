@@ -349,7 +349,7 @@ def test_parts_of_a_name_are_nodes():
 
 
 def test_the_command_says_what_it_made(folder):
-    arguments = ["convert", str(folder / "tables"), str(folder / "log"), "--json"]
+    arguments = ["convert", str(folder / "tables"), "--out", str(folder / "log"), "--json"]
     done = CliRunner().invoke(cli, [*arguments, "--mapping", str(folder / "map.toml")])
     assert done.exit_code == 0, done.output
     assert json.loads(done.output)["ranges"] == 2

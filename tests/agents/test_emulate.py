@@ -372,7 +372,7 @@ def test_what_makes_no_sense_is_refused(tmp_path):
 
 def test_the_command_line(tmp_path):
     def relpos(*args):
-        command = [str(RELPOS), "emulate", "--folder", str(tmp_path / "e"), *args]
+        command = [str(RELPOS), "emulate", "--out", str(tmp_path / "e"), *args]
         return subprocess.run(command, capture_output=True, text=True, check=False)
 
     done = relpos("--seconds", "0.5", "--json", "--key", KEY.hex())
@@ -388,7 +388,7 @@ def test_the_command_line(tmp_path):
 
 
 def test_whoever_ends_it_from_outside_gets_its_figures(tmp_path):
-    command = [str(RELPOS), "emulate", "--folder", str(tmp_path), "--json", "--wait", "600"]
+    command = [str(RELPOS), "emulate", "--out", str(tmp_path), "--json", "--wait", "600"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     with process:
         ready = json.loads(process.stdout.readline())
@@ -403,7 +403,7 @@ def test_whoever_ends_it_from_outside_gets_its_figures(tmp_path):
 
 
 def test_whoever_ends_it_from_outside_gets_its_log(tmp_path):
-    command = [str(RELPOS), "emulate", "--folder", str(tmp_path / "e"), "--json"]
+    command = [str(RELPOS), "emulate", "--out", str(tmp_path / "e"), "--json"]
     command += ["--log", str(tmp_path / "log")]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     with process:
@@ -435,7 +435,7 @@ main()
 
 
 def test_a_log_that_is_being_written_is_written_whole(tmp_path):
-    command = [sys.executable, "-c", INTERRUPTED, "emulate", "--folder", str(tmp_path / "e")]
+    command = [sys.executable, "-c", INTERRUPTED, "emulate", "--out", str(tmp_path / "e")]
     command += ["--json", "--seconds", "0.5", "--log", str(tmp_path / "log")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

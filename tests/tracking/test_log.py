@@ -282,6 +282,22 @@ def test_an_existing_folder_is_not_touched(folder):
     assert sorted(folder.iterdir()) == before
 
 
+def test_only_a_log_folder_is_overwritten(folder, tmp_path_factory):
+    log, other = read_log(folder), tmp_path_factory.mktemp("other")
+    target = write_log(other / "run", log)
+    (target / "old.csv").write_text("kept nowhere")
+    with pytest.raises(LogError, match="new or empty folder$"):
+        write_log(target, log)
+    write_log(target, log, overwrite=True)
+    assert not (target / "old.csv").exists()
+    assert read_log(target).n_ranges == log.n_ranges
+    (other / "notes").mkdir()
+    (other / "notes" / "mine.txt").write_text("precious")
+    with pytest.raises(LogError, match="or a log folder"):
+        write_log(other / "notes", log, overwrite=True)
+    assert (other / "notes" / "mine.txt").read_text() == "precious"
+
+
 @pytest.mark.parametrize("period", [1.5, 1000.0, 1e-6])
 def test_samples_too_rare_or_too_frequent_are_refused(period):
     block = MeasurementBlock.of_kind(

@@ -20,15 +20,20 @@ from tracking.measurements import Kind, MeasurementBlock
 from tracking.mount import KEYS, Mount
 
 
-def write_log(folder: Path | str, log: Log) -> Path:
+def write_log(folder: Path | str, log: Log, *, overwrite: bool = False) -> Path:
     """Write a run so that `read_log` returns the same measurements, bit for bit.
 
     The files are written next to the target and moved there at the end.
 
+    Args:
+        folder: New or empty folder.
+        log: The run.
+        overwrite: Whether the folder may hold a log, which is replaced.
+
     Raises:
-        LogError: The target exists and is not an empty folder, or cannot be written to.
+        LogError: The target exists and is not such a folder, or cannot be written to.
     """
-    check_target(Path(folder))
+    check_target(Path(folder), overwrite=overwrite)
     folder = Path(folder).resolve()  # `.` has no name, and a folder cannot replace a link
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -47,7 +52,7 @@ def write_log(folder: Path | str, log: Log) -> Path:
             (scratch / f"{stem}.csv.gz").write_bytes(packed)
         scratch.chmod(0o755)
         if folder.exists():
-            folder.rmdir()
+            shutil.rmtree(folder) if overwrite else folder.rmdir()
         scratch.rename(folder)
     except BaseException:
         shutil.rmtree(scratch, ignore_errors=True)
@@ -55,18 +60,24 @@ def write_log(folder: Path | str, log: Log) -> Path:
     return folder
 
 
-def check_target(folder: Path) -> None:
+def check_target(folder: Path, *, overwrite: bool = False) -> None:
     """Check that a log can be written to a folder.
+
+    Args:
+        folder: Target folder.
+        overwrite: Whether it may hold a log.
 
     Raises:
         LogError: The folder exists and is not empty, or its parent is unusable.
     """
     try:
         taken = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+        is_log = taken and (folder / "meta.toml").is_file()
     except OSError as error:
         raise LogError(f"{folder}: cannot be written to ({error.strerror})") from error
-    if taken:
-        raise LogError(f"{folder}: exists already, expected a new or empty folder")
+    if taken and not (overwrite and is_log):
+        expected = "a new or empty folder" + (" or a log folder" if overwrite else "")
+        raise LogError(f"{folder}: exists already, expected {expected}")
     parent = next(p for p in folder.absolute().parents if p.exists())
     if not parent.is_dir():
         raise LogError(f"{folder}: {parent} is not a folder")

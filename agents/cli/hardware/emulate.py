@@ -15,7 +15,7 @@ from agents.errors import UsageError
 
 @click.command()
 @click.option(
-    "--folder",
+    "--out",
     type=Path,
     required=True,
     help="Folder for the ports and, once they are ready, swarm.toml.",
@@ -71,7 +71,7 @@ from agents.errors import UsageError
 @click.option("--log", type=Path, help="New log folder with the truth.")
 @json_option
 def emulate(
-    folder: Path,
+    out: Path,
     key: str | None,
     no_operator: bool,
     faults: Path | None,
@@ -108,7 +108,7 @@ def emulate(
     # SIGTERM, as sent to background processes, must also remove the ports.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     result = run(
-        folder=folder,
+        folder=out,
         options=chosen,
         wait=wait,
         log=log,

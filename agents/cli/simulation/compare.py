@@ -72,14 +72,14 @@ WHY = "which has its own cars and task; they drive one after the other"
     help="Time of an episode from which errors are scored [s].",
 )
 @jobs_options("No figure depends on it.")
-@click.option("--swarm", type=Path, help="A swarm.toml: compare on real cars, in turns.")
-@click.option("--arm", is_flag=True, help="Allow the cars of --swarm to move.")
+@click.option("--config", type=Path, help="swarm.toml: compare on real cars, in turns.")
+@click.option("--arm", is_flag=True, help="Allow the cars of --config to move.")
 @json_option
 @out_options("report.html, its pictures and results.jsonl")
 def compare(
     names: tuple[str, ...],
     observations: tuple[str, ...],
-    swarm: Path | None,
+    config: Path | None,
     arm: bool,
     as_json: bool,
     out: Path | None,
@@ -90,7 +90,7 @@ def compare(
     NAME is a controller (consensus, leader-follower, range-only) or a trained policy: its name,
     its file or its folder.
 
-    With --swarm, the comparison runs on real cars in real time, with estimated errors. Keys on a
+    With --config, the comparison runs on real cars in real time, with estimated errors. Keys on a
     terminal: space stops all cars immediately, c clears the stop, q quits.
     """
     from agents.output import check_folder, write_results
@@ -99,12 +99,12 @@ def compare(
     if out is not None:
         check_folder(out, ["report.html"])
     chosen = {k: v for k, v in options.items() if v is not None}
-    if swarm is None:
+    if config is None:
         if arm:
-            raise UsageError("--arm: expected together with --swarm")
+            raise UsageError("--arm: expected together with --config")
         result, films = _simulated(names, observations, chosen, filmed=out is not None)
     else:
-        result, films = _on_cars(names, observations, swarm, arm, chosen), []
+        result, films = _on_cars(names, observations, config, arm, chosen), []
     if out is not None:
         write_results(out, report.compare_files(result, films))
     if as_json:
@@ -154,7 +154,7 @@ def _on_cars(
     context = click.get_current_context()
     for name, option in SIMULATED.items():
         if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
-            raise UsageError(f"{option}: expected without --swarm, {WHY}")
+            raise UsageError(f"{option}: expected without --config, {WHY}")
 
     if arm:
         check_stop_source("terminal")

@@ -8,11 +8,11 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, progress_bar
-from agents.cli.options import json_option, scenario_option
+from agents.cli.options import json_option, log_out_options, scenario_option
 
 
 @click.command()
-@click.argument("out", type=Path)
+@log_out_options
 @scenario_option("; human or human-mocap.", default="cars-nlos")
 @click.option(
     "--seconds", default=120.0, show_default=True, help="Length, 3 to 86400 [s]; people up to 1800."

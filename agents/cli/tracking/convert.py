@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from agents.cli.console import emit_json, progress_bar
-from agents.cli.options import json_option
+from agents.cli.options import json_option, log_out_options
 
 FOLDER = Path(__file__).parents[2] / "convert" / "presets"
 PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
@@ -15,7 +15,7 @@ PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 @click.command()
 @click.argument("source", type=Path)
-@click.argument("out", type=Path)
+@log_out_options
 @click.option("--preset", help=f"A public data set: {PRESETS}.")
 @click.option(
     "--mapping",
@@ -29,6 +29,7 @@ PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
 def convert(
     source: Path,
     out: Path,
+    overwrite: bool,
     preset: str | None,
     mapping: Path | None,
     restamp: bool,
@@ -38,7 +39,15 @@ def convert(
     from agents.convert import convert as run
 
     with progress_bar(f"reading {source}") as report:
-        log = run(source, out, preset=preset, mapping=mapping, restamp=restamp, progress=report)
+        log = run(
+            source,
+            out,
+            preset=preset,
+            mapping=mapping,
+            restamp=restamp,
+            overwrite=overwrite,
+            progress=report,
+        )
     record = {
         "log": log.name,
         "out": str(out),
