@@ -41,6 +41,17 @@ policy_option = click.option(
 )
 
 
+def _check_out(context: click.Context, _: click.Parameter, folder: Path | None) -> Path | None:
+    """Check that a given folder is new or empty, unless --overwrite is given."""
+    from agents.output import check_new
+
+    given = ParameterSource.COMMANDLINE
+    is_free = context.get_parameter_source("overwrite") is given
+    if folder is not None and context.get_parameter_source("out") is given and not is_free:
+        check_new(folder, hint=" or --overwrite")
+    return folder
+
+
 def out_options(
     text: str, *, default: Path | None = None, required: bool = False
 ) -> Callable[[Command], Command]:
@@ -58,15 +69,6 @@ def out_options(
     if default is not None:
         kept |= {"default": default, "show_default": True}
 
-    def check(context: click.Context, _: click.Parameter, folder: Path | None) -> Path | None:
-        from agents.output import check_new
-
-        given = ParameterSource.COMMANDLINE
-        is_free = context.get_parameter_source("overwrite") is given
-        if folder is not None and context.get_parameter_source("out") is given and not is_free:
-            check_new(folder, hint=" or --overwrite")
-        return folder
-
     def add(command: Command) -> Command:
         command = click.option(
             "--overwrite",
@@ -78,7 +80,7 @@ def out_options(
         return click.option(
             "--out",
             type=Path,
-            callback=check,
+            callback=_check_out,
             help=f"New or empty folder for {text}.",
             **kept,
         )(command)
@@ -88,12 +90,16 @@ def out_options(
 
 def log_out_options(command: Command) -> Command:
     """Add `--out` for a log folder, and `--overwrite`, which replaces a log folder."""
-    for option in (
-        click.option("--overwrite", is_flag=True, help="Replace the log folder of --out."),
-        click.option("--out", type=Path, required=True, help="New or empty folder for the log."),
-    ):
-        command = option(command)
-    return command
+    command = click.option(
+        "--overwrite", is_flag=True, is_eager=True, help="Replace the log folder of --out."
+    )(command)
+    return click.option(
+        "--out",
+        type=Path,
+        required=True,
+        callback=_check_out,
+        help="New or empty folder for the log.",
+    )(command)
 
 
 def jobs_options(text: str) -> Callable[[Command], Command]:

@@ -319,7 +319,7 @@ def out_commands():
 @pytest.mark.parametrize("name", sorted({*out_commands()} - {"export"}))
 def test_a_folder_that_holds_anything_is_refused_before_any_work(name, recording, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
-    needed = [recording] if name.split()[0] in ("track", "calibrate") else []
+    needed = [recording] if name.split()[0] in ("track", "calibrate", "convert") else []
     done = relpos(*name.split(), *needed, "--out", tmp_path)
     assert done.returncode == 2
     assert "exists already, expected a new or empty folder or --overwrite" in done.stderr
@@ -342,7 +342,8 @@ def test_overwrite_replaces_files_of_the_same_names_alone(recording, tmp_path):
 def test_every_command_that_writes_results_knows_overwrite():
     assert set(out_commands()) == {
         "track", "calibrate imu", "calibrate mag", "calibrate uwb", "evaluate", "protocol",
-        "demo", "compare", "export", "demo-hardware", "bench tracker", "bench env",
+        "demo", "compare", "export", "demo-hardware", "bench tracker", "bench env", "simulate",
+        "convert",
     }  # fmt: skip
 
 
