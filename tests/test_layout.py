@@ -1,5 +1,6 @@
 """Sizes and descriptions of folders, and import cycles."""
 
+import re
 from pathlib import Path
 
 import grimp
@@ -37,3 +38,11 @@ def test_no_modules_import_each_other():
 def test_packages_tell_type_checkers_that_they_are_typed():
     for package in PACKAGES:
         assert (ROOT / package / "py.typed").exists()
+
+
+def test_unit_tests_of_tracking_import_no_other_package():
+    others = re.compile(
+        r"^\s*(?:from|import) (?:agents|relpos_env|hardware_bridge|benchmarks)\b", re.M
+    )
+    for path in (ROOT / "tests" / "tracking").rglob("*.py"):
+        assert not others.search(path.read_text(encoding="utf-8")), path
