@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 from relpos_env.errors import EnvError
 from relpos_env.scenarios.layout import LAYOUTS, first_in_the_way, most_cars, track
 from relpos_env.scenarios.limits import check_params
+from relpos_env.scenarios.randomisation import Randomisation
 from relpos_env.scenarios.rooms.floor import Area, Floor
 from relpos_env.scenarios.rooms.gap import Gap
 from relpos_env.scenarios.rooms.obstacle import Obstacle, boxes_of
 from relpos_env.scenarios.rooms.overlap import overlap
+from relpos_env.world.car import CarParams
 from tracking.arrays import F64
-
-if TYPE_CHECKING:
-    from relpos_env.scenarios.base import Scenario
 
 MOST_CARS = 20
 """[-] Maximum number of cars for which radio messages and trackers are tested."""
@@ -25,17 +24,41 @@ LARGEST_ROOM = 100.0
 MOST_OBSTACLES = 200
 
 
-def check_scenario(s: Scenario) -> None:
+class _Checked(Protocol):
+    """The fields of a scenario (`relpos_env.scenarios.base`) that are checked together."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def room(self) -> tuple[float, float]: ...
+    @property
+    def ring(self) -> tuple[float, float]: ...
+    @property
+    def layout(self) -> Any: ...
+    @property
+    def start_area(self) -> Area | None: ...
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]: ...
+    @property
+    def gap(self) -> Gap | None: ...
+    @property
+    def n_cars(self) -> int: ...
+    @property
+    def n_cars_range(self) -> tuple[int, int]: ...
+    @property
+    def randomisation(self) -> Randomisation: ...
+    @property
+    def car(self) -> CarParams: ...
+
+
+def check_scenario(s: _Checked) -> None:
     """Check a scenario.
 
     Raises:
         EnvError: Invalid scenario; names the argument and the permitted values.
     """
-    for name, params in (
-        ("car", s.car), ("imu", s.imu), ("mag", s.mag), ("odometer", s.odometer),
-        ("proximity", s.proximity), ("radio", s.radio),
-    ):  # fmt: skip
-        check_params(name, params)
+    for name in ("car", "imu", "mag", "odometer", "proximity", "radio"):
+        check_params(name, getattr(s, name))
     _check_room(s)
     _check_numbers(s)
     if s.gap is not None:
@@ -43,7 +66,7 @@ def check_scenario(s: Scenario) -> None:
     _check_start(s)
 
 
-def _check_room(s: Scenario) -> None:
+def _check_room(s: _Checked) -> None:
     if not re.fullmatch(r"[\w .+-]{1,80}", s.name):
         raise EnvError(f"name: expected 1 to 80 letters, digits, spaces or .+-_, got {s.name!r}")
     least = 2.0 * math.hypot(s.car.length, s.car.width)
@@ -74,7 +97,7 @@ def _check_area(area: Area) -> None:
         raise EnvError(f"start_area: expected x from, y from, x to, y to, got {area}")
 
 
-def _check_numbers(s: Scenario) -> None:
+def _check_numbers(s: _Checked) -> None:
     low, high = s.n_cars_range
     if not 2 <= low <= high <= MOST_CARS:
         raise EnvError(f"n_cars_range: expected 2 <= low <= high <= {MOST_CARS}, got {low}, {high}")
@@ -94,13 +117,13 @@ def _check_numbers(s: Scenario) -> None:
             raise EnvError(f"{name}: expected {low} to {high} in scenario {s.name!r}, got {n}")
 
 
-def _wanted(s: Scenario) -> list[tuple[str, int]]:
+def _wanted(s: _Checked) -> list[tuple[str, int]]:
     """Return the possible initial numbers of cars with the names of their arguments."""
     drawn = s.randomisation.n_cars or ()
     return [("n_cars", s.n_cars), *(("randomisation.n_cars", n) for n in drawn)]
 
 
-def most_that_start(s: Scenario) -> int:
+def most_that_start(s: _Checked) -> int:
     """Return the maximum number of cars that fit at the start."""
     if s.layout != "scattered":
         return most_cars(s.layout, s.ring, s.car)
@@ -108,7 +131,7 @@ def most_that_start(s: Scenario) -> int:
     return floor.room_for(floor.patches(floor.clearance, s.start_area)[2])
 
 
-def _check_start(s: Scenario) -> None:
+def _check_start(s: _Checked) -> None:
     poses = track(s.layout, s.ring)
     hit = first_in_the_way(poses, s.car, s.room, boxes_of(s.obstacles))
     if hit == -2:
@@ -120,7 +143,7 @@ def _check_start(s: Scenario) -> None:
     )
 
 
-def _check_gap(gap: Gap, s: Scenario) -> None:
+def _check_gap(gap: Gap, s: _Checked) -> None:
     least = s.car.width + 0.1
     if gap.width < least:
         raise EnvError(f"gap.width: expected at least {least:g} m for a car, got {gap.width:g}")
