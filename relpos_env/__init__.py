@@ -32,6 +32,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "formation_v0":
+        return import_module("relpos_env.formation_v0")
     if name not in _CLASSES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_CLASSES[name]), name)
