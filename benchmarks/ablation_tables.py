@@ -11,6 +11,7 @@ CAPTIONS = {
     "same cars, of which no wheels are known:",
     "exact": "Groups that begin in motion, in numberings and at rates drawn at random: three "
     "robots with 5 cm of noise on ranges, five hands and drones with exact measurements:",
+    "gliding": "Groups of three of which two go straight on at a constant velocity after 10 s:",
     "convoy": "Vehicles that follow each other:",
     "world": "The second world (`tests/second_world`, mounts unknown):",
     "cars-nlos": "Cars of which one is at fault from 25 s on: ranges 0.6 m too long (offset), half "
@@ -48,7 +49,7 @@ def group_of(kind: str) -> str:
     first, fault = kind.split(" ")[0], kind.partition(", ")[2]
     if fault:
         return first.rstrip(",")
-    return first if first in ("late", "exact", "convoy", "world") else ""
+    return first if first in ("late", "exact", "gliding", "convoy", "world") else ""
 
 
 def cell(row: dict[str, Any]) -> str:

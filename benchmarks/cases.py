@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from agents.simulation.simulate import simulate
 from tests.convoy import Convoy
-from tests.exact_motion import ExactGroup
+from tests.exact_motion import ExactGroup, Gliders
 from tests.second_world.record import record
 from tests.second_world.world import draw
 from tracking.arrays import F64
@@ -103,8 +103,8 @@ def case(kind: str, seed: int) -> Case:
 
     Args:
         kind: Kind of run: a scenario, ``hand``, ``drones``, the name of a recording, ``world
-            KIND``, ``exact VEHICLE``, ``convoy VEHICLE``; ``KIND, FAULT`` adds a fault, ``late
-            KIND`` starts in motion.
+            KIND``, ``exact VEHICLE``, ``gliding VEHICLE``, ``convoy VEHICLE``; ``KIND, FAULT`` adds
+            a fault, ``late KIND`` starts in motion.
         seed: Seed of the run.
     """
     first, _, rest = kind.partition(" ")
@@ -117,6 +117,8 @@ def case(kind: str, seed: int) -> Case:
         return late(case("cars-nlos" if rest == "robots" else rest, seed), seed, rest == "robots")
     if first == "exact":
         return exact(rest, seed)
+    if first == "gliding":
+        return of_group(noisy(Gliders(rest, range(3), seconds=22.0), seed), 22.0)
     if first == "convoy":
         return of_group(Convoy(rest, 3 + seed % 2, seed), 60.0)
     if kind in ("hand", "drones"):
@@ -144,10 +146,15 @@ def exact(vehicle: str, seed: int) -> Case:
     n, d, seconds = (3, 2, 25.0) if vehicle == "robot" else (5, 3, 20.0)
     hz = float(rng.uniform(28.0, 125.0))
     group = ExactGroup(vehicle, list(rng.permutation(n)), hz=hz, dimensions=d, seconds=seconds)
-    if vehicle == "robot":
-        ranges = group.block.kind[0] == Kind.RANGE
-        group.block.values[0, ranges, 0] += 0.05 * rng.standard_normal(ranges.sum())
-    return of_group(group, seconds)
+    return of_group(noisy(group, seed) if vehicle == "robot" else group, seconds)
+
+
+def noisy(group: ExactGroup, seed: int) -> ExactGroup:
+    """Add 5 cm of noise to the ranges of a group; returns it."""
+    ranges = group.block.kind[0] == Kind.RANGE
+    noise = np.random.default_rng(seed).standard_normal(ranges.sum())
+    group.block.values[0, ranges, 0] += 0.05 * noise
+    return group
 
 
 def of_group(group: ExactGroup, seconds: float) -> Case:

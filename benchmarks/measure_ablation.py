@@ -142,6 +142,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
     kinds = ["cars-los", "cars-nlos", "human", "drones", "hand"]
     kinds += [f"late {kind}" for kind in ("cars-nlos", "robots", "human", "drones", "hand")]
     kinds += ["convoy car", "convoy robot", "exact robot", "exact hand", "exact drone"]
+    kinds += ["gliding robot", "gliding human"]
     kinds += [f"world {kind}" for kind in WORLDS]
     faults = ("offset", "outliers", "made up", "silent", "frozen")
     faults += ("stuck IMU", "IMU spikes", "cut off")

@@ -7,7 +7,7 @@ from tracking.measurements import Kind, MeasurementBlock
 from tracking.vehicles import VEHICLES
 
 FINE = 1000.0
-STAND, RAMP = 2.0, 1.0
+STAND, RAMP, GLIDE = 2.0, 1.0, 10.0
 
 
 class ExactGroup:
@@ -83,3 +83,19 @@ class ExactGroup:
             ends = np.full(len(t), i), np.full(len(t), j)
             parts.append(MeasurementBlock.of_kind(Kind.RANGE, t, ends[0], distance, j=ends[1]))
         return MeasurementBlock.concatenate(parts).sorted()
+
+
+class Gliders(ExactGroup):
+    """A group of which two nodes go straight on at a constant velocity from `GLIDE` on.
+
+    Their IMUs then read what they read at rest.
+    """
+
+    def _measure(self, dt):
+        k = int(np.searchsorted(self.fine, GLIDE))
+        later = (self.fine[k:] - self.fine[k])[:, None]
+        for n in (1, 2):
+            self.pos[k:, n] = self.pos[k, n] + 0.6 * later * self._vel[k, n]
+            self._yaw[k:, n] = self._yaw[k, n]
+        self._vel = np.gradient(self.pos, self.fine, axis=0)
+        return super()._measure(dt)
