@@ -23,11 +23,10 @@ _CLASSES = {
     "Scenario": "relpos_env.scenarios",
     "Simulation": "relpos_env.simulation.simulation",
 }
-"""Module of each class, imported on first use."""
+"""Module of each class, imported on first use; that of Stable-Baselines3 needs its extra."""
 
 __all__ = [
-    "EnvError", "FormationGymEnv", "FormationVecEnv", "FormationVectorEnv", "Scenario",
-    "Simulation", "formation_v0",
+    "EnvError", "FormationGymEnv", "FormationVectorEnv", "Scenario", "Simulation", "formation_v0",
 ]  # fmt: skip
 
 

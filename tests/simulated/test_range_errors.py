@@ -128,7 +128,7 @@ def test_nothing_is_ok_while_a_tenth_of_the_ranges_does_not_fit():
     """In a steel hall, a quarter of the ranges is too long by more than 0.5 m."""
     log = simulate(scenario="warehouse", seconds=60.0, seed=22)
     strict = track_log(log, findings=()).score
-    lenient = JointParams(supervision=SupervisionParams(surprise_limit=1e9))
+    lenient = JointParams(supervision=SupervisionParams(group_outlier_ratio=1.0))
     params = TrackerParams(filter=FilterParams(joint=lenient))
     trusting = track_log(log, findings=(), params=params).score
     assert strict.integrity_share < 0.05 < trusting.integrity_share

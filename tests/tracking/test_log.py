@@ -285,17 +285,18 @@ def test_an_existing_folder_is_not_touched(folder):
 def test_only_a_log_folder_is_overwritten(folder, tmp_path_factory):
     log, other = read_log(folder), tmp_path_factory.mktemp("other")
     target = write_log(other / "run", log)
-    (target / "old.csv").write_text("kept nowhere")
+    (target / "mag.csv").write_text("t_s,node,mag_x,mag_y,mag_z\n")
     with pytest.raises(LogError, match="new or empty folder$"):
         write_log(target, log)
     write_log(target, log, overwrite=True)
-    assert not (target / "old.csv").exists()
+    assert not (target / "mag.csv").exists()
     assert read_log(target).n_ranges == log.n_ranges
-    (other / "notes").mkdir()
-    (other / "notes" / "mine.txt").write_text("precious")
-    with pytest.raises(LogError, match="or a log folder"):
-        write_log(other / "notes", log, overwrite=True)
-    assert (other / "notes" / "mine.txt").read_text() == "precious"
+    (target / "raw.bag").write_text("precious")
+    before = sorted(p.name for p in target.iterdir())
+    with pytest.raises(LogError, match="nothing but a log"):
+        write_log(target, log, overwrite=True)
+    assert sorted(p.name for p in target.iterdir()) == before
+    assert [p.name for p in other.iterdir()] == ["run"]
 
 
 @pytest.mark.parametrize("period", [1.5, 1000.0, 1e-6])

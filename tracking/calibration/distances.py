@@ -51,9 +51,14 @@ def range_table(block: MeasurementBlock, constellation: Constellation, truth: Tr
     ends, ok = [], np.ones(r.n_events, dtype=bool)
     for node, antenna in ((r.i[0], r.antenna_i[0]), (r.j[0], r.antenna_j[0])):
         end = pos[inverse, node]
+        if constellation.dimensions == 2:
+            end[:, 2] = 0.0  # heights are those of the mounts
         ok &= known[inverse, node]
         offset = constellation.antenna_offset_b[antenna]
-        levered = np.any(offset != 0.0, axis=1)
+        # In the plane a height alone needs no orientation.
+        across = offset[:, :2] if constellation.dimensions == 2 else offset
+        levered = np.any(across != 0.0, axis=1)
+        end[~levered] += offset[~levered]
         for n in np.unique(node[levered]):
             mine = levered & (node == n)
             q, has = _orientation(truth, int(n), bool(constellation.is_static[n]), r.t[0, mine])

@@ -105,6 +105,8 @@ def find_degenerate(log: Log, estimate: TeamEstimate) -> list[Finding]:
     constellation = log.constellation
     d, pairs = constellation.dimensions, constellation.pairs
     placed = estimate.status >= Status.AMBIGUOUS
+    if constellation.n_nodes <= d:
+        return []
     rows = np.flatnonzero(placed.all(axis=1) & (estimate.status == Status.AMBIGUOUS).any(axis=1))
     if len(rows) <= MOST_AMBIGUOUS * len(placed):
         return []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -84,30 +84,32 @@ def read_meta(path: Path) -> Meta:
 
 
 def write_range_noise(folder: Path | str, noise: float) -> None:
-    """Write `range_noise_m` to the meta.toml of a log, the rest of the file as it was.
+    """Write `range_noise_m` to the meta.toml of a log; the rest of the file stays as it is.
 
     Args:
         folder: Log folder.
         noise: White noise of its ranges [m]; rounded to 0.1 mm.
 
     Raises:
-        LogError: The file cannot be read or written; it is then as it was.
+        LogError: The file cannot be read or written; it is then unchanged.
     """
-    path = Path(folder) / "meta.toml"
-    line = f"range_noise_m = {round(noise, 4)!r}"
-    read_meta(path)
+    path, value = Path(folder) / "meta.toml", round(noise, 4)
+    before = read_meta(path)
+    scratch = path.with_name(f".{path.name}.new")
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        head, rest = _split_tables(text)
+        head, rest = _split_tables(path.read_text(encoding="utf-8-sig"))
         kept = [row for row in head if not re.match(r"\s*range_noise_m\s*=", row)]
         while kept and not kept[-1].strip():
             kept.pop()
-        scratch = path.with_name(f".{path.name}.new")
-        scratch.write_text("\n".join([*kept, line, "", *rest]) + "\n", encoding="utf-8")
-        read_meta(scratch)
+        lines = [*kept, f"range_noise_m = {value!r}", "", *rest]
+        scratch.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        if read_meta(scratch) != replace(before, range_noise=value):
+            raise LogError(f"{path}: write range_noise_m = {value!r} by hand, above the tables")
         scratch.replace(path)
     except OSError as error:
         raise LogError(f"{path}: cannot be written to ({error.strerror})") from error
+    finally:
+        scratch.unlink(missing_ok=True)
 
 
 def _split_tables(text: str) -> tuple[list[str], list[str]]:

@@ -19,6 +19,9 @@ from tracking.log.folder import ACC, FORMAT, GYR, MAG, POWERS, QUAT, Log
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.mount import KEYS, Mount
 
+TABLES = ("ranges", "imu", "mag", "state", "members", "truth")
+"""Tables of a log, files with the suffix .csv or .csv.gz."""
+
 
 def write_log(folder: Path | str, log: Log, *, overwrite: bool = False) -> Path:
     """Write a run so that `read_log` returns the same measurements, bit for bit.
@@ -28,7 +31,7 @@ def write_log(folder: Path | str, log: Log, *, overwrite: bool = False) -> Path:
     Args:
         folder: New or empty folder.
         log: The run.
-        overwrite: Whether the folder may hold a log, which is replaced.
+        overwrite: Whether the folder may hold a log, which is replaced; it may hold no other file.
 
     Raises:
         LogError: The target exists and is not such a folder, or cannot be written to.
@@ -51,9 +54,7 @@ def write_log(folder: Path | str, log: Log, *, overwrite: bool = False) -> Path:
             packed = gzip.compress(text.getvalue().encode(), compresslevel=6, mtime=0)
             (scratch / f"{stem}.csv.gz").write_bytes(packed)
         scratch.chmod(0o755)
-        if folder.exists():
-            shutil.rmtree(folder) if overwrite else folder.rmdir()
-        scratch.rename(folder)
+        _put(scratch, folder)
     except BaseException:
         shutil.rmtree(scratch, ignore_errors=True)
         raise
@@ -65,24 +66,47 @@ def check_target(folder: Path, *, overwrite: bool = False) -> None:
 
     Args:
         folder: Target folder.
-        overwrite: Whether it may hold a log.
+        overwrite: Whether it may hold a log and nothing else.
 
     Raises:
         LogError: The folder exists and is not empty, or its parent is unusable.
     """
     try:
         taken = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
-        is_log = taken and (folder / "meta.toml").is_file()
+        is_log = taken and folder.is_dir() and all(map(_is_of_log, folder.iterdir()))
     except OSError as error:
         raise LogError(f"{folder}: cannot be written to ({error.strerror})") from error
     if taken and not (overwrite and is_log):
-        expected = "a new or empty folder" + (" or a log folder" if overwrite else "")
+        more = " or one with nothing but a log" if overwrite else ""
+        expected = f"a new or empty folder{more}"
         raise LogError(f"{folder}: exists already, expected {expected}")
     parent = next(p for p in folder.absolute().parents if p.exists())
     if not parent.is_dir():
         raise LogError(f"{folder}: {parent} is not a folder")
     if not os.access(parent, os.W_OK):
         raise LogError(f"{folder}: {parent} cannot be written to")
+
+
+def _is_of_log(path: Path) -> bool:
+    """Return whether a file has the name of one that a log consists of."""
+    stem = path.name.removesuffix(".gz").removesuffix(".csv")
+    is_table = path.name in (f"{stem}.csv", f"{stem}.csv.gz") and stem in TABLES
+    return path.is_file() and (is_table or path.name == "meta.toml")
+
+
+def _put(scratch: Path, folder: Path) -> None:
+    """Move a finished folder into place; a log that is there goes last."""
+    if not folder.exists():
+        scratch.rename(folder)
+        return
+    aside = scratch.with_name(f"{scratch.name}-old")
+    folder.rename(aside)
+    try:
+        scratch.rename(folder)
+    except OSError:
+        aside.rename(folder)
+        raise
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def _meta(log: Log) -> str:

@@ -80,7 +80,7 @@ class EmulatedRig:
                 self.folder.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 why = error.strerror
-                raise BridgeError(f"--folder {folder}: cannot be made ({why})") from error
+                raise BridgeError(f"--out {folder}: cannot be made ({why})") from error
             _check_ours(self.folder / SWARM_FILE)
         self._make_port = ports or _ports_in(self.folder)
         self.ports: dict[str, DevicePort] = {}
@@ -195,7 +195,7 @@ def _check_ours(path: Path) -> None:
         return
     with path.open(encoding="utf-8", errors="replace") as stream:
         if stream.readline().rstrip("\n") != WRITTEN_BY:
-            raise BridgeError(f"{path}: not written by an emulation, expected another --folder")
+            raise BridgeError(f"{path}: not written by an emulation, expected another --out")
 
 
 _DEVICES = 0x0DE71CE5

@@ -8,6 +8,7 @@ from tracking.filters.joint.ekf.preintegration import preintegrate
 from tracking.filters.joint.ekf.propagation import predict
 from tracking.filters.joint.hypotheses.alignment import LINEAR, MODES, NONE, STATIC
 from tracking.filters.joint.state import JointState
+from tracking.filters.joint.supervision.residuals import group_outlier_ratio
 from tracking.kernels.addresses import by_reference
 from tracking.kernels.jit import kernel
 from tracking.maths.covariance import apply_downdate
@@ -30,7 +31,7 @@ def write_estimate(c, s, work, t, e, o, out):
     if group.alignment != NONE:
         predict_estimate(c, s, work, t)
     x, P = work.x[0], work.P[0]
-    is_group_doubtful = group.surprise > c.surprise_limit
+    is_group_doubtful = group_outlier_ratio(c, s, t) > c.group_outlier_ratio
     for p in range(s.pairs.shape[0]):
         pair = s.pairs[p]
         node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]

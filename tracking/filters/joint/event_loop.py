@@ -32,7 +32,7 @@ from tracking.filters.joint.hypotheses.initialisation import can_join, can_start
 from tracking.filters.joint.hypotheses.static_initialisation import all_static, may_move
 from tracking.filters.joint.state import one_env
 from tracking.filters.joint.supervision.frozen_range import is_frozen
-from tracking.filters.joint.supervision.residuals import count_surprise, update_residuals
+from tracking.filters.joint.supervision.residuals import update_residuals
 from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
 from tracking.filters.joint.supervision.supervise import supervise
 from tracking.filters.joint.updates.motion_constraints import (
@@ -245,7 +245,6 @@ def update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
         if h == group.best:
             group.loglik_sum += loglik
             group.loglik_n += 1
-            count_surprise(s, pair, loglik)
             pair.nis = nis
             update_residuals(c, s, p, dt, distance, nu, misfit, weight)
             if weight > c.least_sane:

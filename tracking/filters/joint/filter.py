@@ -43,6 +43,7 @@ class JointEkf(BatchedFilter):
 
     def __init__(self, constellation: Constellation, params: JointParams, n_envs: int = 1) -> None:
         self._coefficients = make_coefficients(constellation, params)
+        self._white_var = params.range_error.white_std**2
         self._layout = make_layout(constellation, params)
         n_hyps = bank_size(constellation, self._layout, params.start)
         state = make_state(constellation, params, n_envs, n_hyps)
@@ -102,7 +103,9 @@ class JointEkf(BatchedFilter):
 
     def range_noise(self) -> F64:
         """Return the standard deviation of white range noise, given or learned, (env) [m]."""
-        std: F64 = np.sqrt(self._state.group["white_var"][:, 0])
+        # Larger groups count lasting errors as white noise.
+        lasting = self._coefficients["white_var"][0] - self._white_var
+        std: F64 = np.sqrt(np.maximum(self._state.group["white_var"][:, 0] - lasting, 0.0))
         return std
 
     def fit_sums(self) -> F64:

@@ -120,9 +120,6 @@ GROUP = np.dtype(
         ("mean_nis", "f8"),  # running mean NIS of pairs without a faulty node [-]
         ("misfit", "f8"),  # slow running mean of it [-]
         ("misfit_limit", "f8"),  # misfit that challenges the alignment [-]
-        ("surprise", "f8"),  # running mean of ranges' surprise, `residuals.update_surprise` [-]
-        ("surprise_sum", "f8"),  # sum and number of those since the last update
-        ("surprise_n", "i8"),
         ("nis_sum", "f8"),
         ("nis_n", "i8"),
         ("loglik_sum", "f8"),  # sum and number over all ranges, in the best hypothesis then

@@ -42,7 +42,7 @@ from tracking.filters.joint.hypotheses.initialisation import (
 )
 from tracking.filters.joint.hypotheses.merging import are_same, rotation_between
 from tracking.filters.joint.hypotheses.static_initialisation import TIE, spawn_rotations
-from tracking.filters.joint.supervision.residuals import reset_group_residuals, reset_residuals
+from tracking.filters.joint.supervision.residuals import reset_residuals
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 
@@ -147,7 +147,7 @@ def prune_bank(c, s):
         # Residuals were those of the other hypothesis.
         for p in range(s.pairs.shape[0]):
             reset_residuals(s.pairs[p])
-        reset_group_residuals(group)
+        group.mean_nis = 1.0
     if not is_scored:
         for h in range(n_hyps):
             s.loglik[h] = 0.0

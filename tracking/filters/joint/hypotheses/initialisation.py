@@ -35,7 +35,7 @@ from tracking.filters.joint.hypotheses.static_initialisation import (
     is_at_rest,
     is_settling,
 )
-from tracking.filters.joint.supervision.residuals import reset_group_residuals, reset_residuals
+from tracking.filters.joint.supervision.residuals import reset_residuals
 from tracking.kernels.jit import allocating_kernel, kernel
 from tracking.maths.exponentials import decay
 from tracking.maths.multilateration import best_positions
@@ -103,8 +103,7 @@ def start(c, s, layout, t):
         if s.nodes[members[a]].sideways_var > 0.0:
             group.t_scoring_starts = t + c.wheels_after
     group.heading_gauge_var = c.rotation_var if c.d == 2 else 0.0
-    reset_group_residuals(group)
-    group.misfit, group.misfit_limit = 0.0, c.respawn_nis
+    group.mean_nis, group.misfit, group.misfit_limit = 1.0, 0.0, c.respawn_nis
 
 
 @kernel

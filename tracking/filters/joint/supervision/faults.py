@@ -21,7 +21,6 @@ from tracking.filters.joint.supervision.residuals import (
     mean_range_error,
     node_outlier_ratio,
     others_fit,
-    update_surprise,
 )
 from tracking.kernels.jit import kernel
 from tracking.maths.exponentials import decay
@@ -46,7 +45,7 @@ class Fault(IntEnum):
     LINK = 6
     """The ranges of one pair contradict those of the other pairs."""
     GROUP = 7
-    """Ranges of the whole group are less likely than expected: estimate or model is wrong."""
+    """Ranges of the whole group are outliers: the estimate or the error model is wrong."""
     FROZEN = 8
     """A pair repeats one range while its nodes travel."""
     STALE = 9
@@ -63,8 +62,7 @@ class Remedy(NamedTuple):
     action: str
 
 
-PERIOD, PERIOD_ALL = "each period, by the largest ratio", "each period"
-RANGE = "each range"
+PERIOD, RANGE = "each period, by the largest ratio", "each range"
 CATALOGUE: dict[Fault, Remedy] = {
     Fault.BIAS: Remedy(
         "node_bias_limit", PERIOD, "an offset common to the node's ranges becomes a state"
@@ -91,7 +89,7 @@ CATALOGUE: dict[Fault, Remedy] = {
         "pair_nis_limit", RANGE, "its ranges count less and less; the pair is `doubtful`"
     ),
     Fault.GROUP: Remedy(
-        "supervision.surprise_limit", PERIOD_ALL, "every pair of the group is `doubtful`"
+        "supervision.group_outlier_ratio", RANGE, "every pair of the group is `doubtful`"
     ),
     Fault.FROZEN: Remedy(
         "supervision.frozen_ranges", RANGE, "the range is ignored until another number comes"
@@ -182,11 +180,9 @@ def position_misfit(c, s, layout, i, t):
 
 @kernel
 def update_group_misfit(c, s, dt):
-    """Update misfit and surprise of the group, and the limit that challenges raise, over dt [s]."""
+    """Update the misfit of the group, and the limit that challenges raise, over dt [s]."""
     group = s.group[0]
-    share = 1.0 - decay(dt / c.misfit_time)
-    group.misfit += share * (group.mean_nis - group.misfit)
-    update_surprise(group, share)
+    group.misfit += (1.0 - decay(dt / c.misfit_time)) * (group.mean_nis - group.misfit)
     keep = decay(dt / c.challenge_time)
     group.misfit_limit = keep * group.misfit_limit + (1.0 - keep) * c.respawn_nis
 

@@ -22,9 +22,9 @@ class SupervisionParams:
     accepted. Larger: outliers count more."""
     outlier_nis: float = 6.0
     """[-] NIS from which on a range is an outlier, one in seventy; larger: fewer are."""
-    surprise_limit: float = 1.2
-    """[-] Mean surprise of a group's ranges over `misfit_time` above which no moving pair is `ok`;
-    0.5 is that of white noise alone. Larger: fewer groups are doubtful."""
+    group_outlier_ratio: float = 0.1
+    """[-] No pair of a group is ok above this mean outlier share of its pairs; larger: pairs of a
+    group with many outliers stay ok."""
     residual_clip: float = 1.0
     """[m] Limit of a range's deviation in residual statistics; larger: outliers count more."""
     fastest: float = 10.0
@@ -103,7 +103,7 @@ class AlignmentParams:
     gauge_std: float = 0.05
     """[rad] Rotation error above which each range checks the null space; larger: cheaper."""
     misfit_time: float = 3.3
-    """[s] Time constant of a group's misfit and surprise; larger: slower and steadier."""
+    """[s] Time constant of a group's misfit; larger: slower and steadier."""
     challenge_raise: float = 1.5
     """[-] Factor on the limit of the misfit by a challenge in the plane; larger: fewer follow."""
     challenge_time: float = 60.0

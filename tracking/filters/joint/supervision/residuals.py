@@ -49,37 +49,6 @@ def update_residuals(c, s, p, dt, distance, nu, misfit, sane):
 
 
 @small_kernel
-def count_surprise(s, pair, loglik):
-    """Add the surprise of a range of a pair to the sum of its group, if neither node is faulty."""
-    if s.nodes[pair.i].fault == 0 and s.nodes[pair.j].fault == 0:
-        s.group[0].surprise_sum -= loglik + 0.5 * math.log(s.group[0].white_var)
-        s.group[0].surprise_n += 1
-
-
-@small_kernel
-def update_surprise(group, share):
-    """Move the mean surprise of a group towards that of its ranges since the last update.
-
-    Surprise is the negative log-likelihood of a range, in units of the white noise and without the
-    constant: 0.5 for ranges with that noise only.
-
-    Args:
-        group: GROUP, updated.
-        share: Weight of these ranges.
-    """
-    if group.surprise_n > 0:
-        group.surprise += share * (group.surprise_sum / group.surprise_n - group.surprise)
-    group.surprise_sum, group.surprise_n = 0.0, 0
-
-
-@small_kernel
-def reset_group_residuals(group):
-    """Reset the residual statistics of a group."""
-    group.mean_nis, group.surprise = 1.0, 0.5
-    group.surprise_sum, group.surprise_n = 0.0, 0
-
-
-@small_kernel
 def is_ranging(c, s, p, t):
     """True if both nodes of pair p are present and it had a range lately."""
     pair = s.pairs[p]
@@ -95,6 +64,19 @@ def node_outlier_ratio(c, s, layout, i, t):
     for k in range(s.nodes.shape[0]):
         if k != i and is_ranging(c, s, layout.pair_index[i, k], t):
             total += s.pairs[layout.pair_index[i, k]].outlier_ratio
+            n += 1
+    return total / max(n, 1)
+
+
+@kernel
+def group_outlier_ratio(c, s, t):
+    """Return the mean share of outliers over the pairs that range, without faulty nodes [-]."""
+    total, n = 0.0, 0
+    for p in range(s.pairs.shape[0]):
+        pair = s.pairs[p]
+        has_fault = s.nodes[pair.i].fault != 0 or s.nodes[pair.j].fault != 0
+        if not has_fault and is_ranging(c, s, p, t):
+            total += pair.outlier_ratio
             n += 1
     return total / max(n, 1)
 
