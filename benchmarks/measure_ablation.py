@@ -69,7 +69,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "fast range error": part("range_error", fast_std=0.0),
     "second order": part("range_error", nonlinearity_gain=0.0),
     "NLOS": nlos(los_to_nlos_rate=ALWAYS, los_to_nlos_rate_with_power=ALWAYS),
-    "large NLOS": nlos(nlos_large_share=0.0, nlos_large_share_with_power=0.0),
+    "large NLOS": nlos(nlos_large_share=0.0),
     "power of ranges": nlos(power_diff_weight=ALWAYS),
     "learned noise": part("noise_learning", learns=False),
     "contradicting pairs count less": part("update", contradiction_share=NEVER),

@@ -355,7 +355,7 @@ def test_the_command_says_what_it_made(folder):
     assert json.loads(done.output)["ranges"] == 2
     for options, message in (([], "expected one of them"), (["--preset", "x"], "expected one of")):
         with pytest.raises(UsageError, match=message):
-            CliRunner().invoke(cli, [*arguments, *options], catch_exceptions=False)
+            CliRunner().invoke(cli, [*arguments, "--overwrite", *options], catch_exceptions=False)
 
 
 @pytest.mark.parametrize(

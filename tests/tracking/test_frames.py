@@ -150,7 +150,7 @@ def test_a_frame_is_not_likelier_for_being_surer(parted):
             c, s, 1, p, levers[:3], levers[3:], work.idx, work.val
         )
         work.direct[:] = 0.0
-        sight = (0.0, c["los_to_nlos_rate"], c["nlos_to_los_rate"], c["nlos_large_share"])
+        sight = (0.0, c["los_to_nlos_rate"], c["nlos_to_los_rate"])
         range_update.range_update(c, s, 1, p, 0.02, distance, levers, sight, work)
         of_range = s.loglik[1]
         work.idx[0], work.val[0] = s.nodes["i_vel"][0], 1.0
@@ -166,7 +166,7 @@ def test_the_nis_is_over_the_variance_that_the_correction_used():
     c, s, work, _ = open_bank()
     s.group["n_alive"], s.group["alignment"] = 1, Alignment.FILTERED
     h, p, levers = 0, 0, np.zeros(6)
-    sight = (0.0, c["los_to_nlos_rate"], c["nlos_to_los_rate"], c["nlos_large_share"])
+    sight = (0.0, c["los_to_nlos_rate"], c["nlos_to_los_rate"])
 
     def predicted():
         distance, m = range_update.predict_range(

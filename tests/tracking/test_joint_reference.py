@@ -71,7 +71,6 @@ def follow(reference, block, first, last):
         if block.has_power[0, k]:
             evidence = power_evidence(c.view(np.recarray), values[1] - values[2])
             rates = c["los_to_nlos_rate_with_power"], c["nlos_to_los_rate_with_power"]
-            share = c["nlos_large_share_with_power"]
         advance(reference, t)
         for node in (i, j):
             reference.integrate(node, t)

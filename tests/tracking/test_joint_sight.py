@@ -99,7 +99,7 @@ def test_sight_is_judged_by_the_rule_of_bayes(before, nu, variance, evidence):
     at, dt, rates = s.pairs["i_range_error"][0] + 1, 0.1, (0.7, 2.5)
     slow = s.x[0, at]
     found = update_nlos_posterior(
-        c, s, 0, 0, dt, nu, variance, (evidence, *rates, 0.3), np.zeros(s.x.shape[1])
+        c, s, 0, 0, dt, nu, variance, (evidence, *rates), np.zeros(s.x.shape[1])
     )
 
     def density(mean, var):
@@ -109,8 +109,8 @@ def test_sight_is_judged_by_the_rule_of_bayes(before, nu, variance, evidence):
     chain = expm(dt * np.array([[-rates[0], rates[0]], [rates[1], -rates[1]]]))
     enter, leave = chain[0, 1], chain[1, 0]
     S, hidden = variance + c["white_var"], np.exp(evidence)
-    near = 0.7 * density(c["nlos_bias"], S + c["nlos_bias_var"])
-    far = 0.3 * density(c["nlos_bias_large"], S + c["nlos_bias_large_var"])
+    near = (1.0 - c["nlos_large_share"]) * density(c["nlos_bias"], S + c["nlos_bias_var"])
+    far = c["nlos_large_share"] * density(c["nlos_bias_large"], S + c["nlos_bias_large_var"])
     same = density(0.0, S)
     entered = (1.0 - before) * enter * (near + far) * hidden
     left = before * leave * density(-slow, S + 1.0 + c["slow_var"])

@@ -112,8 +112,6 @@ def posterior_bound(
     n = constellation.n_nodes
     cov = np.zeros((len(t_out), n * d, n * d))
     coefficients = make_coefficients(constellation, params)
-    if log.block.has_power.any():
-        coefficients["nlos_large_share"] = coefficients["nlos_large_share_with_power"]
     state = _with_a_row_more(make_state(constellation, params, 1, 1), coefficients)
     fields = (as_records(a[0]) if a.dtype.names else a[0] for a in state)
     coefficients = as_records(coefficients)

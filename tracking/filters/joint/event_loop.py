@@ -90,14 +90,10 @@ def run_events(coefficients, layout, state, work, block, t_out, out):
                 a_i, a_j = antenna_i[e, k], antenna_j[e, k]
                 if i > j:
                     i, j, a_i, a_j = j, i, a_j, a_i
-                sight = (0.0, c.los_to_nlos_rate, c.nlos_to_los_rate, c.nlos_large_share)
+                sight = (0.0, c.los_to_nlos_rate, c.nlos_to_los_rate)
                 if has_power[e, k]:
-                    sight = (
-                        power_evidence(c, values[e, k, 1] - values[e, k, 2]),
-                        c.los_to_nlos_rate_with_power,
-                        c.nlos_to_los_rate_with_power,
-                        c.nlos_large_share_with_power,
-                    )
+                    evidence = power_evidence(c, values[e, k, 1] - values[e, k, 2])
+                    sight = (evidence, c.los_to_nlos_rate_with_power, c.nlos_to_los_rate_with_power)
                 is_survey, now, distance = what == SURVEY, t[e, k], values[e, k, 0]
                 action = process_range(
                     c, s, layout, work, i, j, a_i, a_j, now, distance, sight, is_survey

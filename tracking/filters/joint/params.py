@@ -55,8 +55,6 @@ class NlosParams:
     """[m] Standard deviation of `nlos_bias`; larger: NLOS ranges correct less."""
     nlos_large_share: float = 0.0
     """[-] Share of obstacles with a large bias (no powers); larger: more ranges count as NLOS."""
-    nlos_large_share_with_power: float = 0.0
-    """[-] Share of large biases where ranges have powers; larger: more ranges count as NLOS."""
     nlos_bias_large: float = 0.6
     """[m] Mean of a large bias; larger: longer ranges count as NLOS."""
     nlos_bias_large_std: float = 0.5
@@ -88,23 +86,17 @@ class NlosParams:
     """[m] Width of the outliers' uniform density; larger: fewer ranges are taken for outliers."""
 
     def __post_init__(self) -> None:
-        check_numbers(self, may_be_zero=("nlos_large_share", "nlos_large_share_with_power"))
-        for name in ("nlos_large_share", "nlos_large_share_with_power"):
-            share = getattr(self, name)
-            if not 0.0 <= share <= 1.0:
-                raise ConfigError(f"{name}: expected a share from 0 to 1, got {share}")
+        check_numbers(self, may_be_zero=("nlos_large_share",))
+        if not 0.0 <= self.nlos_large_share <= 1.0:
+            raise ConfigError(
+                f"nlos_large_share: expected a share from 0 to 1, got {self.nlos_large_share}"
+            )
 
 
-NLOS_IN_PLANE = NlosParams(
-    los_to_nlos_rate=0.4, nlos_to_los_rate=2.0, nlos_large_share=0.3, nlos_bias_length=20.0
-)
-"""Without powers, small biases cannot be separated from other range errors: only obstacles that
-last for a second and may add half a metre count."""
 NLOS_IN_SPACE = NlosParams(
     los_to_nlos_rate=0.5,
     nlos_to_los_rate=2.0,
     nlos_large_share=0.2,
-    nlos_large_share_with_power=0.2,
     nlos_bias_length=10.0,
     white_std=0.2,
 )
@@ -242,7 +234,7 @@ class JointParams:
     vehicles: dict[str, VehicleParams] = field(default_factory=lambda: dict(VEHICLES))
     """Vehicles by `NodeConfig.vehicle`."""
     range_error: RangeErrorParams = field(default_factory=RangeErrorParams)
-    nlos: NlosParams = NLOS_IN_PLANE
+    nlos: NlosParams = field(default_factory=NlosParams)
     """NLOS ranges of groups in the plane."""
     nlos_in_space: NlosParams = NLOS_IN_SPACE
     noise_learning: NoiseLearningParams = field(default_factory=NoiseLearningParams)

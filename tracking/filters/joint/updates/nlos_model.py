@@ -38,11 +38,11 @@ def update_nlos_posterior(c, s, h, p, dt, nu, variance, sight, w):
         the bias after a transition to NLOS is a large one.
     """
     at = s.pairs[p].i_range_error + 1
-    evidence, los_to_nlos_rate, nlos_to_los_rate, large_share = sight
+    evidence, los_to_nlos_rate, nlos_to_los_rate = sight
     enter, leave = transition_probs(los_to_nlos_rate, nlos_to_los_rate, dt)
     S = variance + s.group[0].white_var
-    near = (1.0 - large_share) * likelihood(nu - c.nlos_bias, S + c.nlos_bias_var)
-    far = large_share * likelihood(nu - c.nlos_bias_large, S + c.nlos_bias_large_var)
+    near = (1.0 - c.nlos_large_share) * likelihood(nu - c.nlos_bias, S + c.nlos_bias_var)
+    far = c.nlos_large_share * likelihood(nu - c.nlos_bias_large, S + c.nlos_bias_large_var)
     nu_leave, S_leave = nu, S
     if at > 0:
         nu_leave = nu + s.x[h, at]

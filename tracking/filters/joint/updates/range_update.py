@@ -164,7 +164,7 @@ def range_update(c, s, h, p, dt, distance, levers, sight, work):
         distance: Range [m].
         levers: Antennas of i and j relative to their nodes, six numbers [m].
         sight: Log-likelihood ratio of NLOS from the powers, 0 if they are not reported; rates of
-            transitions to NLOS and to LOS [1/s]; share of large biases.
+            transitions to NLOS and to LOS [1/s].
         work: Workspace.
 
     Returns:
