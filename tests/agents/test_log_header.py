@@ -7,11 +7,13 @@ import pytest
 
 from agents.evaluation.track import params_for, track_log
 from agents.simulation.simulate import simulate
+from tracking.calibration.distances import range_table
 from tracking.errors import LogError
 from tracking.filters import FilterParams
 from tracking.filters.joint.params import JointParams
 from tracking.log import read_log, write_log, write_range_noise
 from tracking.measurements import Kind
+from tracking.mount import Mount
 from tracking.tracker import TrackerParams
 
 
@@ -76,3 +78,40 @@ def test_numbers_that_make_no_sense_are_named(noisy, tmp_path, line, message):
     meta.write_text(f"{line}\n{meta.read_text()}")
     with pytest.raises(LogError, match=message):
         read_log(folder)
+
+
+def test_a_key_that_would_land_inside_a_text_is_refused(noisy, tmp_path):
+    folder = write_log(tmp_path / "run", noisy)
+    meta = folder / "meta.toml"
+    text = meta.read_text().replace('source = "', 'source = """\n[not a table]\n', 1)
+    line = text.index("[not a table]")
+    end = text.index('"\n', line)
+    meta.write_text(text[:end] + '"""\n' + text[end + 2 :])
+    before = meta.read_text()
+    with pytest.raises(LogError, match="by hand|TOML"):
+        write_range_noise(folder, 0.1)
+    assert meta.read_text() == before
+    assert sorted(p.name for p in folder.iterdir() if p.name.startswith(".")) == []
+
+
+def test_the_noise_of_a_large_group_is_that_of_a_range_alone():
+    """Ten cars have no states for lasting errors, which count as white noise on top."""
+    log = simulate(scenario="hall", seconds=5.0, seed=3, cars=10)
+    given = replace(log, range_noise=0.07)
+    assert track_log(given, findings=[]).range_noise == pytest.approx(0.07)
+
+
+def test_true_ranges_of_a_planar_log_have_the_heights_of_mounts_once(noisy):
+    heights = (0.0, 0.6, 0.2)
+    nodes = tuple(
+        replace(n, mount=Mount(height=h))
+        for n, h in zip(noisy.constellation.nodes, heights, strict=True)
+    )
+    who = replace(noisy.constellation, nodes=nodes, antennas=())
+    truth = replace(noisy.truth, pos_w=noisy.truth.pos_w + [0.0, 0.0, 0.3])
+    level = range_table(noisy.block, replace(who, nodes=noisy.constellation.nodes), truth)
+    slanted = range_table(noisy.block, who, truth)
+    up = np.array(heights)[slanted.j] - np.array(heights)[slanted.i]
+    assert slanted.known.mean() > 0.9
+    rows = slanted.known
+    np.testing.assert_allclose(slanted.true[rows], np.hypot(level.true, up)[rows], atol=1e-9)
