@@ -75,7 +75,7 @@ def test_without_any_imu_the_notes_say_what_cannot_be_known():
 
 @pytest.mark.parametrize("across", [0.0, 1.5])
 def test_a_row_of_nodes_at_rest_is_its_own_mirror_image(across):
-    """Four people who stand in a row, or with one of them beside it."""
+    """Four people in a row, or one of them off the row."""
     rng = np.random.default_rng(2)
     nodes = tuple(NodeConfig(id=k, vehicle="human") for k in range(4))
     where = np.array([[0.0, 0.0], [1.0, 0.01], [2.0, across], [3.5, -0.01]])
