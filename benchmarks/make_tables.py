@@ -296,6 +296,19 @@ def second_world() -> str:
     return markdown(head, rows, right=", ".join(head[1:]))
 
 
+def time_to_ok() -> str:
+    """Return the table of the times until pairs are ok."""
+    head = ("runs of", "an efficient estimator [s]", "`ok` [s]", "within twice", "never `ok`")
+    rows = []
+    for line in (MEASURED / "time-to-ok.jsonl").read_text().splitlines():
+        r = json.loads(line)
+        rows.append([
+            r["kind"], f"{r['needed_s']:.1f}", f"{r['ok_s']:.1f}",
+            f"{100.0 * r['within_twice']:.0f} %", f"{r['never']}/{r['sufficient']}",
+        ])  # fmt: skip
+    return markdown(head, rows, right=", ".join(head[1:]))
+
+
 def policy_results() -> str:
     """Return the table of errors of the shipped policy with distance sensors and of controllers."""
     head = ("room", "cars", "driver", "error", "95 %", "place", "tracking", "collisions/min",
@@ -401,6 +414,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "faults": faults,
     "findings": findings,
     "second-world": second_world,
+    "time-to-ok": time_to_ok,
     "policy-results": policy_results,
     "room-results": room_results,
     "recording-results": recording_results,

@@ -1,8 +1,9 @@
 """Metrics of the filters on simulated rooms and on recordings.
 
 Run `relpos evaluate --seeds 50 --jobs 2 --out FOLDER`, then this script with the same folder. It
-adds the recordings and writes benchmarks/results/tracker-results.jsonl, the input of
-`benchmarks/make_tables.py`.
+adds cars of the second world (`another_simulator`) and the recordings, and writes
+benchmarks/results/tracker-results.jsonl, the input of `benchmarks/make_tables.py`. With
+`--others`, it measures the second world and the recordings only, and keeps the rooms.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from another_simulator import SUITE as ANOTHER_SIMULATOR
 from cases import RECORDINGS, recording
 
+from agents.evaluation.evaluate import evaluate
 from agents.evaluation.track import track_log
 from tracking.findings import examine
 from tracking.metrics.bound import recorded_bound
@@ -35,6 +38,12 @@ def suite_lines(folder: Path) -> list[dict[str, Any]]:
     """Return the rounded lines of the rooms of the paper."""
     lines = [json.loads(line) for line in (folder / "results.jsonl").read_text().splitlines()]
     return [rounded(line, SUITE) for line in lines if "lost_runs" in line]
+
+
+def simulator_lines() -> list[dict[str, Any]]:
+    """Return the rounded lines of the second world."""
+    found = evaluate(suite=ANOTHER_SIMULATOR, jobs=2)
+    return [rounded(line.record, SUITE) for line in found.cases]
 
 
 def recording_lines() -> list[dict[str, Any]]:
@@ -62,6 +71,13 @@ def rounded(line: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
+def kept_lines() -> list[dict[str, Any]]:
+    """Return the lines of the rooms of the paper in the present file."""
+    lines = [json.loads(line) for line in FILE.read_text().splitlines()]
+    return [line for line in lines if "seeds" in line and line["case"] != "another simulator"]
+
+
 if __name__ == "__main__":
-    found = [*suite_lines(Path(sys.argv[1])), *recording_lines()]
+    rooms = kept_lines() if sys.argv[1] == "--others" else suite_lines(Path(sys.argv[1]))
+    found = [*rooms, *simulator_lines(), *recording_lines()]
     FILE.write_text("".join(json.dumps(line) + "\n" for line in found))

@@ -11,7 +11,6 @@ import numpy as np
 from agents.evaluation.lost import converged_at, lost_at
 from agents.evaluation.over_time import OverTime, over_time
 from agents.evaluation.suites import Case
-from relpos_env.core.oracle_params import matched_params
 from tracking.geometry import quat_from_yaw, rotate
 from tracking.log import Log
 from tracking.measurements import Kind
@@ -171,7 +170,7 @@ def run_seed(case: Case, seed: int, filters: tuple[str, ...], seconds: float) ->
     """
     log = case.log(seed, seconds)
     stays = log.truth.pairs(log.constellation, log.truth.times())[1].all()
-    bound = posterior_bound(log, matched_params(case.scenario), skip=SKIP) if stays else None
+    bound = posterior_bound(log, case.bound_params(seed), skip=SKIP) if stays else None
     return [run(case, log, name, seed, bound) for name in filters]
 
 

@@ -15,12 +15,14 @@ from agents.evaluation.changes import (
     without_powers,
 )
 from agents.simulation.simulate import record
+from relpos_env.core.oracle_params import matched_params
 from relpos_env.scenarios import HumanScenario, Scenario
 from relpos_env.scenarios.cars import CARS_LOS, CARS_NLOS
 from relpos_env.scenarios.people import HUMAN
 from relpos_env.scenarios.randomisation import Randomisation
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.radio.channel import CALIBRATED, INDOOR, ChannelParams
+from tracking.filters.joint.params import JointParams
 from tracking.log import Log
 
 Change = Callable[[Log, np.random.Generator], Log]
@@ -53,6 +55,10 @@ class Case:
         if self.change is None:
             return log
         return self.change(log, np.random.default_rng([seed, 1]))
+
+    def bound_params(self, seed: int) -> JointParams:
+        """Return the parameters that match the simulation of one seed, for its bound."""
+        return matched_params(self.scenario)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

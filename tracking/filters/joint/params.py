@@ -27,7 +27,7 @@ class RangeErrorParams:
     nonlinearity_gain: float = 1.0
     """[-] Factor on the second-order error of a range, added as noise; it lasts, so it counts more
     than once. Larger: near, uncertain nodes are corrected less."""
-    max_pairs: int = 28
+    max_pairs: int = 66
     """[-] Pairs up to which lasting errors are states, else white noise; larger: slower."""
     lasting_weight: float = 10.0
     """[-] Factor on the variances of lasting errors without states, which are white noise of the
