@@ -105,8 +105,8 @@ def continuous() -> str:
     return markdown(
         ("index", "values", "meaning"),
         [
-            ["0", "-1 to 1", f"forward speed wanted, share of {MAX_SPEED:g} m/s"],
-            ["1", "-1 to 1", f"steering angle wanted, share of {MAX_STEERING:g} rad; left is +"],
+            ["0", "-1 to 1", f"commanded forward speed, share of {MAX_SPEED:g} m/s"],
+            ["1", "-1 to 1", f"commanded steering angle, share of {MAX_STEERING:g} rad; left is +"],
         ],
     )
 

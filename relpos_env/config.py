@@ -116,10 +116,10 @@ class FormationConfig:
         task_builder(self.task)
         ours = self.task if isinstance(self.task, str) else ""
         name = DEFAULT_SCENARIO.get(ours, "ring-nlos")
-        wanted = name if self.scenario is None else self.scenario
-        if not isinstance(wanted, str | Path | Scenario):
-            raise EnvError(f"scenario: expected a name, a path or a scenario, got {wanted!r}")
-        scenario = find_scenario(wanted)
+        requested = name if self.scenario is None else self.scenario
+        if not isinstance(requested, str | Path | Scenario):
+            raise EnvError(f"scenario: expected a name, a path or a scenario, got {requested!r}")
+        scenario = find_scenario(requested)
         if self.level is not None:
             scenario = scenario.at_level(whole_number("level", self.level, 0, 4))
         n_cars = self.n_cars

@@ -135,13 +135,13 @@ class Reader:
             share = np.maximum(o[..., where["range"]], 0.0) / np.maximum(length(target), TINY)
             pos = share * target[0], share * target[1]
             # Without a target there is no direction.
-            ok = ok & (o[..., where["wanted"]] > 0.5) & (length(target) > TINY)
+            ok = ok & (o[..., where["has_target"]] > 0.5) & (length(target) > TINY)
         return Sight(
             ok=ok,
             pos=pos,
             vel=vel,
             certainty=certainty,
-            placed=o[..., where["wanted"]] > 0.5,
+            placed=o[..., where["has_target"]] > 0.5,
             target=target,
             command=_vector(o, where["command"]),
             heading=_vector(o, where["heading"]),

@@ -93,8 +93,8 @@ def corrected(
     pushing = bounds
     if around is not None:
         pushing = joined(bounds, standing_bounds(around, avoidance.clearance))
-    wanted = pushed_back((sight.command[0] + x, sight.command[1] + y), pushing, avoidance)
-    actions = search(sight, drive(sight, wanted, bounds, steering, avoidance))
+    desired = pushed_back((sight.command[0] + x, sight.command[1] + y), pushing, avoidance)
+    actions = search(sight, drive(sight, desired, bounds, steering, avoidance))
     if around is not None:
         clear_arc(around, sight, actions, steering.wheelbase, avoidance.clearance)
         # The new arc may lead to other cars.

@@ -45,9 +45,9 @@ class Bag:
 
     def records(self, names: list[str]) -> Iterator[Record]:
         """Yield the messages of some topics in the order of receipt."""
-        wanted = [c for c in self._reader.connections if c.topic in names]
+        selected = [c for c in self._reader.connections if c.topic in names]
         counts: Counter[str] = Counter()
-        for connection, receipt, raw in self._reader.messages(connections=wanted):
+        for connection, receipt, raw in self._reader.messages(connections=selected):
             message = self._reader.deserialize(raw, connection.msgtype)
             t = 1e-9 * receipt
             if not self._by_receipt and hasattr(message, "header"):

@@ -168,7 +168,7 @@ def true_error(result: DriveResult, log: Log, t: F64) -> F64:
     there = log.truth.valid.reshape(len(times), n)
     k = np.clip(np.searchsorted(times, t), 0, len(times) - 1)
     apart = pos[k][:, None, :] - pos[k][:, :, None]
-    both = there[k][:, None, :] & there[k][:, :, None] & result.wanted
+    both = there[k][:, None, :] & there[k][:, :, None] & result.has_target
     off = np.linalg.norm(apart - result.target, axis=-1)
     counted = both.sum(axis=(1, 2))
     error: F64 = np.where(both, off, 0.0).sum(axis=(1, 2)) / np.maximum(counted, 1)

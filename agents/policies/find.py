@@ -24,18 +24,18 @@ def shipped_names() -> list[str]:
     return sorted(path.stem for path in SHIPPED.glob("*.onnx"))
 
 
-def find_policy(wanted: str | Path) -> tuple[Path, Path]:
+def find_policy(name_or_path: str | Path) -> tuple[Path, Path]:
     """Return the paths of the network and the card of a policy.
 
     Args:
-        wanted: One of the two files, a folder with one policy, or the name of a shipped policy.
+        name_or_path: One of the two files, a folder with one policy, or the name of a shipped one.
 
     Raises:
         PolicyError: There is no such policy, or a file of another type.
     """
-    if str(wanted) in shipped_names():
-        return _pair(SHIPPED / f"{wanted}.onnx")
-    path = Path(wanted)
+    if str(name_or_path) in shipped_names():
+        return _pair(SHIPPED / f"{name_or_path}.onnx")
+    path = Path(name_or_path)
     suffix = path.suffix.lower()
     if suffix in PICKLES:
         raise PolicyError(path, UNSAFE)

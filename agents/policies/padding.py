@@ -16,23 +16,23 @@ class Padding:
     number of cars.
     """
 
-    def __init__(self, wanted: Layout, given: Layout) -> None:
+    def __init__(self, required: Layout, given: Layout) -> None:
         """Compute the indices.
 
         Args:
-            wanted: Layout of the policy.
+            required: Layout of the policy.
             given: Layout of the observations, equal except for at most as many cars.
         """
-        where = wanted.padding_from(given)
-        self._size = wanted.size
+        where = required.padding_from(given)
+        self._size = required.size
         self._places = np.flatnonzero(where >= 0)  # sorted below by the order in `given`
         self._places = self._places[np.argsort(where[self._places])]
-        absent = np.where(where < 0, wanted.alone(), np.float32(0.0))
+        absent = np.where(where < 0, required.alone(), np.float32(0.0))
         # All zero in most modes, which is faster.
-        self._absent = absent.reshape(wanted.history, -1) if absent.any() else None
+        self._absent = absent.reshape(required.history, -1) if absent.any() else None
 
     def __call__(self, observations: F32) -> F32:
-        """Return the padded observations, (..., wanted size).
+        """Return the padded observations, (..., required size).
 
         Args:
             observations: Observations, (..., given size). Zeros of absent cars stay zeros.
@@ -49,16 +49,16 @@ class Padding:
 class PaddedDriver:
     """Driver for more cars than the environment has."""
 
-    def __init__(self, driver: Driver, wanted: Layout, given: Layout) -> None:
+    def __init__(self, driver: Driver, required: Layout, given: Layout) -> None:
         """Combine the driver with the padding.
 
         Args:
-            driver: Driver for observations of `wanted`.
-            wanted: Layout of the driver.
+            driver: Driver for observations of `required`.
+            required: Layout of the driver.
             given: Layout of the observations; see `Padding`.
         """
         self._driver, self._given = driver, given.size
-        self._pad = Padding(wanted, given)
+        self._pad = Padding(required, given)
 
     def act(self, observations: F32) -> F32:
         """Return the actions, (..., 2); see `Driver`.

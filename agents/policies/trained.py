@@ -86,17 +86,17 @@ class TrainedPolicy:
         return PaddedDriver(self, self.layout, layout)
 
 
-def load_policy(wanted: str | Path) -> TrainedPolicy:
+def load_policy(name_or_path: str | Path) -> TrainedPolicy:
     """Load a policy without unpickling, and validate it before it runs.
 
     Args:
-        wanted: ``name.onnx``, ``name.json``, a folder with one policy, or the name of a policy of
-            the package.
+        name_or_path: ``name.onnx``, ``name.json``, a folder with one policy, or the name of a
+            policy of the package.
 
     Raises:
         PolicyError: The policy is missing, damaged, or incompatible; names the file and the reason.
     """
-    network_file, card_file = find_policy(wanted)
+    network_file, card_file = find_policy(name_or_path)
     card = Card.from_json(read_bounded(card_file, MOST_CARD), str(card_file))
     data = read_bounded(network_file, MOST_NETWORK)
     return TrainedPolicy(check_policy(data, card, str(network_file)), card)

@@ -12,7 +12,7 @@ _SCRIPT = """
 <span></span></div>
 <p class="key">Filled cars are true. Dashed outlines are where the tracker of the first car believes
 the others to be, with ellipses of two standard deviations. Lines between cars: green in sight,
-orange behind an obstacle. Crosses mark the wanted formation around the first car.</p>
+orange behind an obstacle. Crosses mark the target formation around the first car.</p>
 <script>
 (() => {
 const drives = __DATA__, me = document.currentScript.parentElement;

@@ -37,7 +37,7 @@ class FrameRecorder:
         state, task, view = swarm.state.take(0), formation.task, formation.loop.view
         i, j = swarm.constellation.pairs.T
         viewer = int(np.argmax(state.present))
-        target, wanted = task.target[0, viewer], task.has_target[0, viewer]
+        target, has_target = task.target[0, viewer], task.has_target[0, viewer]
         tracking, formed = errors(formation)
         frame = {
             "t": round(float(formation.t[0]), 2),
@@ -48,7 +48,8 @@ class FrameRecorder:
             "sight": swarm.line_of_sight(0)[i, j].astype(int).tolist(),
             "viewer": viewer,
             "target": [
-                rounded(place) if has else None for place, has in zip(target, wanted, strict=True)
+                rounded(place) if has else None
+                for place, has in zip(target, has_target, strict=True)
             ],
             "estimate": [
                 rounded([*pos, *ellipse(*cov), heading]) if ok else None

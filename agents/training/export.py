@@ -121,11 +121,11 @@ def read_results(path: Path, names: Iterable[str]) -> list[dict[str, Any]]:
         found.append(record)
     # Lines of single episodes have no number of episodes.
     summaries = [r for r in found if "episodes" in r]
-    wanted = set(names)
-    ours = [r for r in summaries if r.get("policy") in wanted]
+    selected = set(names)
+    ours = [r for r in summaries if r.get("policy") in selected]
     if not ours:
         drivers = ", ".join(sorted({str(r.get("policy")) for r in summaries})) or "none"
-        expected = " or ".join(sorted(wanted))
+        expected = " or ".join(sorted(selected))
         raise UsageError(f"--results {path}: expected lines of {expected}, got those of {drivers}")
     return ours
 

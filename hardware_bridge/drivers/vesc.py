@@ -82,8 +82,8 @@ class VescOptions:
         fastest = MOST_ERPM / abs(self.speed_to_erpm)
         expect(0.0 < self.max_speed <= fastest, "max_speed", f"0 to {fastest:g}", self.max_speed)
         slowest = self.min_erpm / abs(self.speed_to_erpm)
-        wanted = f"at least {slowest:.3g}, which is min_erpm"
-        expect(self.max_speed >= slowest, "max_speed", wanted, self.max_speed)
+        allowed = f"at least {slowest:.3g}, which is min_erpm"
+        expect(self.max_speed >= slowest, "max_speed", allowed, self.max_speed)
         expect(0.0 < self.max_steering <= 1.5, "max_steering", "0 to 1.5", self.max_steering)
         expect(0.0 <= self.min_erpm <= MOST_ERPM, "min_erpm", f"0 to {MOST_ERPM:g}", self.min_erpm)
         expect(0.0 < self.brake_current <= 200.0, "brake_current", "0 to 200", self.brake_current)

@@ -188,7 +188,7 @@ class OperatorDevice:
         for k in np.flatnonzero(present).tolist():
             source = Source(str(OPERATOR), self._boot, self._sequence, ticks, MICROSECONDS_32)
             self._sequence = (self._sequence + 1) % (1 << 32)
-            wanted = (float(velocity[k, 0]), float(velocity[k, 1]))
-            reading = OperatorReading(source, str(self._cars[k]), wanted)
+            requested = (float(velocity[k, 0]), float(velocity[k, 1]))
+            reading = OperatorReading(source, str(self._cars[k]), requested)
             frames.append(self._encoder.encode([reading]))
         self.line.send(t_ns, frames)

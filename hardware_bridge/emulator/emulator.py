@@ -122,8 +122,8 @@ class Emulator:
         while self._script and self._script[0][0] <= world.t:
             self._befall(heapq.heappop(self._script)[2], world.t)
         for k, car in enumerate(self.cars):
-            wanted = car.listen(world.t, t_ns)
-            self._speed[k], self._steering[k] = (0.0, 0.0) if world.at_rest else wanted
+            commanded = car.listen(world.t, t_ns)
+            self._speed[k], self._steering[k] = (0.0, 0.0) if world.at_rest else commanded
         block = world.step(self._speed, self._steering)
         t, powered = world.t, world.powered
         for k, (device, rows) in enumerate(

@@ -65,9 +65,9 @@ class ReadyPerception:
         self._turns: F64 = np.zeros((1, group.n_nodes))
         self.rebind(block, powered)
 
-    def share(self, target: F64, wanted: Bool, command: F64) -> None:
+    def share(self, target: F64, has_target: Bool, command: F64) -> None:
         """Bind the arrays of the task to the view; see `Perception.share`."""
-        self.view = self.view._replace(target=target, wanted=wanted, command=command)
+        self.view = self.view._replace(target=target, has_target=has_target, command=command)
         self.rebind(self._block, self._powered)
 
     def reset(self, env: int = 0) -> None:

@@ -182,11 +182,11 @@ class LiveGroup:
 
     def _ask(self) -> None:
         """Write the commanded velocity of the cars: the plan, plus an operator's trim."""
-        wanted = self.task.plan
+        requested = self.task.plan
         if self.swarm.config.task.command == "link":
-            wanted = wanted + self.swarm.trim
-        speed = np.hypot(wanted[..., 0], wanted[..., 1])[..., None]
-        limited = wanted * FASTEST_COMMAND / np.maximum(speed, FASTEST_COMMAND)
+            requested = requested + self.swarm.trim
+        speed = np.hypot(requested[..., 0], requested[..., 1])[..., None]
+        limited = requested * FASTEST_COMMAND / np.maximum(speed, FASTEST_COMMAND)
         self._command[:] = np.where(self.swarm.view.present[..., None], limited, 0.0)
 
     def _observe(self) -> None:

@@ -29,7 +29,7 @@ def draw_picture(
     view, group, n = swarm.view, swarm.group, swarm.config.n_slots
     q = blank_picture(1, n)
     q.t[0] = t
-    q.speed_wanted[0], q.steering_wanted[0] = speed, steering
+    q.requested_speed[0], q.requested_steering[0] = speed, steering
     q.present[0], q.oriented[0] = view.present[0], view.oriented[0]
     q.heading[0], q.speed[0] = view.heading[0], view.speed[0]
     q.status[0], q.pos[0], q.vel[0] = view.status[0], view.pos[0], view.vel[0]

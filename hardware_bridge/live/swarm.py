@@ -89,9 +89,9 @@ class LiveSwarm:
         """Number of measurements that came later than the horizon waits."""
         return int(self._perception.n_late[0])
 
-    def share(self, target: F64, wanted: Bool, command: F64) -> None:
+    def share(self, target: F64, has_target: Bool, command: F64) -> None:
         """Use arrays of the task in the view; see `Perception.share`."""
-        self._perception.share(target, wanted, command)
+        self._perception.share(target, has_target, command)
 
     def take(self, chunk: Chunk) -> None:
         """Process received bytes."""

@@ -148,10 +148,10 @@ class Gate:
         told = nothing_told(heard.shape, p) if told is None else told
         forward, backward = np.full((2, *heard.shape), p.max_speed)
         left, right = np.full((2, *heard.shape), p.max_steering)
-        wanted = np.nan_to_num(
-            picture.speed_wanted, nan=0.0, posinf=p.max_speed, neginf=-p.max_speed
+        requested = np.nan_to_num(
+            picture.requested_speed, nan=0.0, posinf=p.max_speed, neginf=-p.max_speed
         )
-        ahead = wanted >= 0.0
+        ahead = requested >= 0.0
         limiting, holding = np.full((2, *heard.shape), NO_REASON)
         # Comparisons with NaN are false; rules are written so that NaN counts as a fault.
         with np.errstate(invalid="ignore", over="ignore"):
@@ -165,7 +165,7 @@ class Gate:
                 on, back = (np.where(cap >= 0.0, cap, 0.0) for cap in verdict[:2])
                 self._slow[k] = (on < p.max_speed) | (back < p.max_speed)
                 cap = np.where(ahead, on, back)
-                limiting[(cap < np.where(ahead, forward, backward)) & (cap < np.abs(wanted))] = k
+                limiting[(cap < np.where(ahead, forward, backward)) & (cap < np.abs(requested))] = k
                 holding[verdict.hold & (holding == NO_REASON)] = k
                 forward, backward = np.minimum(forward, on), np.minimum(backward, back)
                 left, right = np.fmin(left, verdict.left), np.fmin(right, verdict.right)
@@ -173,8 +173,8 @@ class Gate:
         self._held = np.where(hold & self.armed, holding, self._held)
         self.armed &= ~hold & ~self.emergency[:, None]
         self._well_since = np.where(hold, np.inf, np.minimum(self._well_since, now[:, None]))
-        speed = np.clip(wanted, -backward, forward)
-        steering = np.clip(np.nan_to_num(picture.steering_wanted), -right, left)
+        speed = np.clip(requested, -backward, forward)
+        steering = np.clip(np.nan_to_num(picture.requested_steering), -right, left)
         self._move(speed, steering, now)
         held = np.where(self.emergency[:, None], EMERGENCY, np.where(hold, holding, self._held))
         return GateOutput(

@@ -18,9 +18,9 @@ class Picture(NamedTuple):
 
     t: F64
     """Time, by the host's monotonic clock, (env) [s]."""
-    speed_wanted: F64
+    requested_speed: F64
     """Requested speed, (env, car) [m/s]."""
-    steering_wanted: F64
+    requested_steering: F64
     """Requested steering angle, (env, car) [rad]."""
     present: F64
     """1 if the car takes part, (env, car)."""
@@ -80,8 +80,8 @@ def blank_picture(n_envs: int, n_cars: int) -> Picture:
     z = np.zeros
     return Picture(
         t=np.full(n_envs, -np.inf),
-        speed_wanted=z(own),
-        steering_wanted=z(own),
+        requested_speed=z(own),
+        requested_steering=z(own),
         present=z(own),
         oriented=z(own),
         heading=z(own),

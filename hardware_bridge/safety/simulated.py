@@ -59,7 +59,7 @@ class SimulatedGate:
             now = here.now.copy()
             q = blank_picture(1, speed.shape[1])
             q.t[:] = now
-            q.speed_wanted[0], q.steering_wanted[0] = speed[env], steering[env]
+            q.requested_speed[0], q.requested_steering[0] = speed[env], steering[env]
             q.present[:], q.oriented[:] = here.present, here.oriented
             q.heading[:], q.speed[:] = here.heading, here.speed
             q.status[:], q.pos[:], q.vel[:] = here.status, here.pos, here.vel

@@ -78,11 +78,11 @@ def reset_options(options: Mapping[str, Any] | None, parts: Parts) -> ResetOptio
         if name not in KNOWN:
             raise EnvError(f"options: expected names among {', '.join(KNOWN)}, got {name!r}")
     poses, goals = options.get("poses"), options.get("goals")
-    wanted = options.get("scenario")
+    requested = options.get("scenario")
     return ResetOptions(
         poses=None if poses is None else _rows("poses", poses, 3),
         goals=None if goals is None else _rows("goals", goals, 2),
-        scenario=None if wanted is None else _fitting(find_scenario(wanted), parts),
+        scenario=None if requested is None else _fitting(find_scenario(requested), parts),
     )
 
 
@@ -101,26 +101,26 @@ def _rows(name: str, value: Any, columns: int) -> F64:
     return array
 
 
-def _fitting(wanted: Scenario, parts: Parts) -> Scenario:
+def _fitting(requested: Scenario, parts: Parts) -> Scenario:
     """Return the scenario, if it fits an environment that was made for another one.
 
     Raises:
         EnvError: The scenario does not fit.
     """
     made = parts.scenario
-    if wanted.room != made.room:
-        raise EnvError(f"scenario: expected a room of {made.room} m, got {wanted.room}")
-    if wanted.max_boxes > max(made.max_boxes, 1):
+    if requested.room != made.room:
+        raise EnvError(f"scenario: expected a room of {made.room} m, got {requested.room}")
+    if requested.max_boxes > max(made.max_boxes, 1):
         raise EnvError(
-            f"scenario: expected at most {made.max_boxes} obstacles, got {wanted.max_boxes}"
+            f"scenario: expected at most {made.max_boxes} obstacles, got {requested.max_boxes}"
         )
-    if wanted.radio.session != made.radio.session:
+    if requested.radio.session != made.radio.session:
         raise EnvError("scenario: expected the radio protocol of the environment, got another")
     for name, ours, theirs in (
-        ("height of the antennas", made.radio.antenna_height, wanted.radio.antenna_height),
-        ("number of magnetic waves", made.mag.n_waves, wanted.mag.n_waves),
-        ("furnish", made.furnish, wanted.furnish),
+        ("height of the antennas", made.radio.antenna_height, requested.radio.antenna_height),
+        ("number of magnetic waves", made.mag.n_waves, requested.mag.n_waves),
+        ("furnish", made.furnish, requested.furnish),
     ):
         if ours != theirs:
             raise EnvError(f"scenario: expected the {name} of the environment, got another")
-    return wanted.with_cars(min(parts.n_cars, wanted.n_cars_range[1]))
+    return requested.with_cars(min(parts.n_cars, requested.n_cars_range[1]))

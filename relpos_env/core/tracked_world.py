@@ -86,15 +86,15 @@ class TrackedWorld:
         part._singles = {}
         return part
 
-    def share(self, target: F64, wanted: Bool, command: F64) -> None:
+    def share(self, target: F64, has_target: Bool, command: F64) -> None:
         """Let the view share the memory of the targets and commands of task and operator.
 
         Args:
             target: As in `AgentView`.
-            wanted: As in `AgentView`.
+            has_target: As in `AgentView`.
             command: As in `AgentView`.
         """
-        self.perception.share(target, wanted, command)
+        self.perception.share(target, has_target, command)
         self._singles = {}
 
     def begin(

@@ -50,11 +50,11 @@ def put_wishes(view, out, e, a, k, c, s):
         if b == a:
             continue
         o = b if b < a else b - 1
-        wanted = view.wanted[e, a, b]
-        out[e, a, k + o] = 1.0 if wanted else 0.0
+        has_target = view.has_target[e, a, b]
+        out[e, a, k + o] = 1.0 if has_target else 0.0
         x, y = view.target[e, a, b, 0], view.target[e, a, b, 1]
         at = k + n - 1 + 2 * o
-        if wanted:
+        if has_target:
             put_turned(out, e, a, at, x, y, c, s, FAR)
         else:
             out[e, a, at], out[e, a, at + 1] = 0.0, 0.0

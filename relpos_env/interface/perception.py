@@ -97,15 +97,15 @@ class Perception:
         """Number of measurements in the horizon, (env)."""
         return self.horizon.state.n_waiting
 
-    def share(self, target: F64, wanted: Bool, command: F64) -> None:
+    def share(self, target: F64, has_target: Bool, command: F64) -> None:
         """Use arrays of the task and the operator in the view, without a copy.
 
         Args:
             target: As in `AgentView`.
-            wanted: As in `AgentView`.
+            has_target: As in `AgentView`.
             command: As in `AgentView`.
         """
-        self.view = self.view._replace(target=target, wanted=wanted, command=command)
+        self.view = self.view._replace(target=target, has_target=has_target, command=command)
         self.rebind(self._block, self._powered)
 
     def reset(self, env: int) -> None:

@@ -47,7 +47,7 @@ class AgentView(NamedTuple):
     """Total minus first-path received power of the last range, (env, car, other) [dB]."""
     target: F64
     """Target position of the other relative to the car, (env, car, other, 2) [m]."""
-    wanted: Bool
+    has_target: Bool
     """True where the task sets a target, (env, car, other)."""
     command: F64
     """Velocity commanded by the operator, (env, car, 2) [m/s]."""
@@ -85,7 +85,7 @@ def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> AgentView:
         heard=np.full(other, -np.inf),
         gap=np.zeros(other),
         target=np.zeros((*other, 2)),
-        wanted=np.zeros(other, dtype=bool),
+        has_target=np.zeros(other, dtype=bool),
         command=np.zeros((*own, 2)),
         speed=np.zeros(own),
         steering=np.zeros(own),

@@ -156,9 +156,9 @@ class Scenario:
         Raises:
             EnvError: There is no level of this number.
         """
-        wanted = level(number)
-        if wanted.n_cars is not None:
-            low = max(wanted.n_cars[0], self.n_cars_range[0])
-            high = min(wanted.n_cars[1], self.n_cars_range[1], most_that_start(self))
-            wanted = replace(wanted, n_cars=(low, high) if low <= high else None)
-        return replace(self, randomisation=wanted)
+        randomisation = level(number)
+        if randomisation.n_cars is not None:
+            low = max(randomisation.n_cars[0], self.n_cars_range[0])
+            high = min(randomisation.n_cars[1], self.n_cars_range[1], most_that_start(self))
+            randomisation = replace(randomisation, n_cars=(low, high) if low <= high else None)
+        return replace(self, randomisation=randomisation)

@@ -86,11 +86,11 @@ def scenario_from(
     where, rest = Where(file, raises=EnvError), dict(table)
     inherited: list[Gap | None] = []
 
-    def parent(wanted: str) -> Scenario:
-        if not is_path(wanted):
-            base = look_up(SHIPPED, wanted, "extends")
+    def parent(name_or_path: str) -> Scenario:
+        if not is_path(name_or_path):
+            base = look_up(SHIPPED, name_or_path, "extends")
         elif depth < DEEPEST:
-            base = _load(_within(folder, wanted, ""), depth + 1)
+            base = _load(_within(folder, name_or_path, ""), depth + 1)
         else:
             raise EnvError(f"expected files that extend each other at most {DEEPEST} deep")
         inherited.append(base.gap)
@@ -118,25 +118,25 @@ def scenario_from(
         raise where.error(str(error)) from error
 
 
-def _within(folder: Path | None, wanted: str, key: str) -> Path:
+def _within(folder: Path | None, relative: str, key: str) -> Path:
     """Return the path of a file that a scenario names; only its own folder is permitted.
 
     Args:
         folder: Folder of the scenario; files may be below it.
-        wanted: Path in the scenario.
+        relative: Path in the scenario.
         key: Prefix of error messages.
 
     Raises:
         EnvError: The path is outside of the folder (scenarios are shared), or invalid.
     """
     folder = folder or Path()
-    path = folder / wanted
+    path = folder / relative
     try:
         inside = path.resolve().is_relative_to(folder.resolve())
     except (ValueError, RuntimeError, OSError):  # a null byte, a loop of symbolic links
         inside = False
     if not inside or path.is_dir():
-        raise EnvError(f"{key}expected a file in the folder of the scenario, got {wanted!r}")
+        raise EnvError(f"{key}expected a file in the folder of the scenario, got {relative!r}")
     return path
 
 

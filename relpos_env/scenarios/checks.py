@@ -104,7 +104,7 @@ def _check_numbers(s: _Checked) -> None:
     if s.n_cars < 2:
         raise EnvError(f"n_cars: expected at least 2, got {s.n_cars}")
     most = most_that_start(s)
-    for name, n in _wanted(s):
+    for name, n in _initial_numbers(s):
         if n > most:
             where = "into" if s.layout == "scattered" else "on the loop of"
             if s.layout == "line":
@@ -112,12 +112,12 @@ def _check_numbers(s: _Checked) -> None:
             raise EnvError(
                 f"{name}: {n} do not fit {where} scenario {s.name!r}, expected at most {most}"
             )
-    for name, n in _wanted(s):
+    for name, n in _initial_numbers(s):
         if not low <= n <= high:
             raise EnvError(f"{name}: expected {low} to {high} in scenario {s.name!r}, got {n}")
 
 
-def _wanted(s: _Checked) -> list[tuple[str, int]]:
+def _initial_numbers(s: _Checked) -> list[tuple[str, int]]:
     """Return the possible initial numbers of cars with the names of their arguments."""
     drawn = s.randomisation.n_cars or ()
     return [("n_cars", s.n_cars), *(("randomisation.n_cars", n) for n in drawn)]

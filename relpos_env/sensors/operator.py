@@ -81,7 +81,7 @@ class Seen(Protocol):
         """Mask of the cars in the room, (env, car)."""
 
 
-class Wanted(Protocol):
+class PlannedMotion(Protocol):
     """Task state that the operator receives."""
 
     @property
@@ -138,7 +138,7 @@ class Operator:
         self._seen[envs] = 0.0
         self.command[envs] = 0.0
 
-    def sample(self, state: Seen, task: Wanted, envs: slice) -> F64:
+    def sample(self, state: Seen, task: PlannedMotion, envs: slice) -> F64:
         """Compute the commanded velocities.
 
         Args:

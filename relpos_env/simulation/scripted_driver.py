@@ -34,10 +34,10 @@ class LoopDrivers:
         wave = np.sin(2.0 * np.pi * self._frequency * state.t + self._phase)
         speed = 1.2 + 0.5 * wave[0]
         lane = 1.0 + 0.18 * wave[1]
-        wanted = self._loop_direction(state.pos_w, lane) + self._keep_apart(
+        desired = self._loop_direction(state.pos_w, lane) + self._keep_apart(
             state.pos_w, state.present
         )
-        error = np.arctan2(wanted[:, 1], wanted[:, 0]) - state.heading + 0.25 * wave[2]
+        error = np.arctan2(desired[:, 1], desired[:, 0]) - state.heading + 0.25 * wave[2]
         error = (error + np.pi) % (2.0 * np.pi) - np.pi
         steering = np.clip(1.5 * error, -0.42, 0.42)
         speed = np.where(np.abs(error) > 1.2, 0.6, speed)

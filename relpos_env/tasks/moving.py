@@ -144,8 +144,8 @@ class MovingFormation(Task):
         A stationary frame moves if slots for this number of cars would be in an obstacle.
         """
         if self._stand is not None:
-            wanted = self._frame[env, :2]
-            self._frame[env, :2] = self._free_anchor(self._stand, env, wanted, len(cars))
+            requested = self._frame[env, :2]
+            self._frame[env, :2] = self._free_anchor(self._stand, env, requested, len(cars))
         self._give(env, pos, cars, t)
 
     def update(self, state: Truth, t: F64, collided: F64, envs: slice) -> None:
@@ -187,11 +187,11 @@ class MovingFormation(Task):
         )
         return n_changed
 
-    def _free_anchor(self, stand: Stand, env: int, wanted: F64, n: int) -> F64:
-        """Return the feasible anchor of a formation of n cars nearest to `wanted`, (2) [m]."""
+    def _free_anchor(self, stand: Stand, env: int, requested: F64, n: int) -> F64:
+        """Return the feasible anchor of a formation of n cars nearest to `requested`, (2) [m]."""
         c, s = np.cos(self._motion.heading), np.sin(self._motion.heading)
         places = self._formation.places(n) @ np.array([[c, s], [-s, c]])
-        return free_anchor(wanted, np.array(stand.half), places, self._boxes[env])
+        return free_anchor(requested, np.array(stand.half), places, self._boxes[env])
 
     def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
         frame_now(env, t, self._frame, self._motion.curve.pieces, self._constants, self._now)

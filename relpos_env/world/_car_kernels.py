@@ -57,12 +57,12 @@ def drive_car(p, body, drive, e, n, speed, steering, dt, wrench):
     rate = body[e, n, RATE]
 
     angle = _steer(p, drive, e, n, steering, dt)
-    wanted = _clip(speed, p.max_speed)
-    motor = _motor(p, drive[e, n, ACCEL], wanted, v_x)
+    commanded = _clip(speed, p.max_speed)
+    motor = _motor(p, drive[e, n, ACCEL], commanded, v_x)
     drive[e, n, STEERING] = angle
     drive[e, n, ACCEL] = motor
 
-    pushes = motor * wanted > 0.0
+    pushes = motor * commanded > 0.0
     if pushes or abs(v_x) + abs(v_y) + abs(rate) > SETTLED:
         f_x, f_y, torque = _tyres(p, v_x, v_y, rate, angle, motor, pushes, dt)
         wrench[e, n, 0] = c * f_x - s * f_y
@@ -138,16 +138,16 @@ def _steer(p, drive, e, n, command, dt):
     then = (turn - int(p.delay_steps)) & (N_PAST - 1)
     drive[e, n, TURN] = (turn + 1) & (N_PAST - 1)
     angle = drive[e, n, STEERING]
-    wanted = _clip(drive[e, n, PAST + then], p.max_steering)
-    return angle + _clip(wanted - angle, p.steering_rate * dt)
+    commanded = _clip(drive[e, n, PAST + then], p.max_steering)
+    return angle + _clip(commanded - angle, p.steering_rate * dt)
 
 
 @small_kernel
-def _motor(p, motor, wanted, v_x):
+def _motor(p, motor, commanded, v_x):
     """Return the motor acceleration after a step: a speed controller with a lag [m/s2]."""
-    asked = p.speed_gain * (wanted - v_x)
-    if wanted != 0.0:
-        asked += math.copysign(p.rolling, wanted)
+    asked = p.speed_gain * (commanded - v_x)
+    if commanded != 0.0:
+        asked += math.copysign(p.rolling, commanded)
     asked = _clip(asked, p.max_brake if asked * v_x < 0.0 else p.max_accel)
     motor = asked + p.motor_keep * (motor - asked)
     return motor if abs(motor) > SETTLED else 0.0

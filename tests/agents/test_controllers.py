@@ -38,7 +38,7 @@ def draw(rng, mode, n_cars, n):
     fields = observation_mode(mode, n_cars).fields
     where = split_fields(fields)
     o = rng.uniform(-1.0, 1.0, (n, total_size(fields))).astype(np.float32)
-    for stretch in ("mask", "wanted"):
+    for stretch in ("mask", "has_target"):
         o[:, where[stretch]] = rng.random((n, n_cars - 1)) < 0.8
     for stretch in ("pos", "target", "range"):
         if stretch in where:
@@ -138,14 +138,14 @@ def test_it_follows_the_command_alone_when_nothing_is_known(name, mode):
 def test_it_stands_in_the_wanted_formation(name, mode):
     places = np.array([[1.0, 0.5], [-1.0, 2.0]])
     ranges = np.hypot(*places.T)
-    told = dict(mask=1, wanted=1, pos=places, range=ranges, target=places, heading=[1, 0])
+    told = dict(mask=1, has_target=1, pos=places, range=ranges, target=places, heading=[1, 0])
     assert not build(name, mode).act(observe(mode, **told)).any()
 
 
 @pytest.mark.parametrize(("name", "mode"), READABLE)
 def test_it_drives_to_its_place(name, mode):
     """The other car is farther ahead than its target, so the car moves there."""
-    told = dict(mask=1, wanted=1, pos=[2.5, 0.0], range=2.5, target=[2.0, 0.0], heading=[1, 0])
+    told = dict(mask=1, has_target=1, pos=[2.5, 0.0], range=2.5, target=[2.0, 0.0], heading=[1, 0])
     speed, steering = build(name, mode, 2).act(observe(mode, 2, **told))
     assert speed > 0.05
     assert steering == 0.0
@@ -157,7 +157,7 @@ def test_an_unsure_estimate_moves_less(name):
     speeds = []
     for std in (0.0, 0.1, 0.3, 1.0):
         told = dict(
-            mask=1, wanted=1, pos=[2.3, 0], target=[2, 0], heading=[1, 0], std=[std, std, 0]
+            mask=1, has_target=1, pos=[2.3, 0], target=[2, 0], heading=[1, 0], std=[std, std, 0]
         )
         speeds.append(build(name, "estimate_cov", 2).act(observe("estimate_cov", 2, **told))[0])
     assert np.all(np.diff(speeds) < 0.0)
@@ -165,7 +165,9 @@ def test_an_unsure_estimate_moves_less(name):
 
 
 def test_an_old_range_and_one_behind_an_obstacle_move_less():
-    told = dict(mask=1, wanted=1, range=2.3, target=[2.0, 0.0], heading=[1, 0], command=[0.5, 0])
+    told = dict(
+        mask=1, has_target=1, range=2.3, target=[2.0, 0.0], heading=[1, 0], command=[0.5, 0]
+    )
     now, old, hidden = (
         build("range-only", "ranges", 2).act(observe("ranges", 2, **told, **more))[0]
         for more in ({}, {"age": 0.5}, {"gap": 12.0})
@@ -176,7 +178,7 @@ def test_an_old_range_and_one_behind_an_obstacle_move_less():
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_cars_without_a_place_do_not_count(name):
-    told = dict(mask=1, pos=[[2.0, 0.0], [0.0, 3.0]], wanted=[1, 0], target=[[2, 0], [0, 0]])
+    told = dict(mask=1, pos=[[2.0, 0.0], [0.0, 3.0]], has_target=[1, 0], target=[[2, 0], [0, 0]])
     assert not build(name).act(observe(heading=[1, 0], **told)).any()
 
 
@@ -207,6 +209,6 @@ def test_all_cars_follow_the_same_leader(heading):
     reader = Reader(observation_mode("estimate", 4).fields, "", ("estimate",))
     for k in range(4):
         to = (np.delete(places, k, axis=0) - places[k]) @ turn
-        told = dict(mask=1, wanted=1, target=to, heading=[np.cos(heading), np.sin(heading)])
+        told = dict(mask=1, has_target=1, target=to, heading=[np.cos(heading), np.sin(heading)])
         chosen = leader(reader.read(observe(n_cars=4, **told)))
         np.testing.assert_array_equal(np.delete(np.arange(4) == 1, k), chosen)

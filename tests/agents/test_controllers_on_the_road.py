@@ -44,7 +44,7 @@ class Cars:
             rest = np.delete(np.arange(n), k)
             told = dict(
                 mask=1, pos=(self.pos[rest] - self.pos[k]) @ into,
-                vel=(self.vel[rest] - self.vel[k]) @ into, wanted=1,
+                vel=(self.vel[rest] - self.vel[k]) @ into, has_target=1,
                 target=(places[rest] - places[k]) @ into, command=command[k] @ into,
                 heading=[c, s], motion=[self.speed[k], self.steering[k]],
             )  # fmt: skip
@@ -74,10 +74,10 @@ def test_range_only_goes_down_the_gradient():
     reader = Reader(TRIO, "", ("estimate",))
     for _ in range(10):
         pos, places = rng.normal(0.0, 2.0, (2, 3, 2))
-        wanted = np.linalg.norm(places[1:] - places[0], axis=1)
+        expected = np.linalg.norm(places[1:] - places[0], axis=1)
 
-        def cost(own, pos=pos, wanted=wanted):
-            return 0.5 * np.sum((np.linalg.norm(pos[1:] - own, axis=1) - wanted) ** 2)
+        def cost(own, pos=pos, expected=expected):
+            return 0.5 * np.sum((np.linalg.norm(pos[1:] - own, axis=1) - expected) ** 2)
 
         o = Cars(pos, np.zeros(3)).observe(TRIO, places, np.zeros((3, 2)))
         steps = 1e-5 * np.eye(2)

@@ -148,9 +148,9 @@ def test_driven_through_bytes_it_goes_as_the_environment_with_the_same_commands(
     assert len(acks) >= 495
     wishes = [r for r in host.readings["operator"] if isinstance(r, OperatorReading)]
     assert len(wishes) == 31 * n
-    wanted = {r.to: r.velocity for r in wishes}
+    expected = {r.to: r.velocity for r in wishes}
     np.testing.assert_allclose(
-        [wanted[str(k)] for k in rig.constellation.ids], rig.world.command, atol=6e-4
+        [expected[str(k)] for k in rig.constellation.ids], rig.world.command, atol=6e-4
     )
     rig.close()
 

@@ -55,12 +55,12 @@ def test_others_that_do_not_count_cost_nothing_and_change_nothing(n_present):
     rng = np.random.default_rng(n_present)
     seen = rng.normal(size=(7, layout_of(config).size)).astype(np.float32)
     present = np.arange(5) < n_present
-    for name in ("_mask", "_wanted"):
+    for name in ("_mask", "_has_target"):
         seen[:, getattr(features, name).numpy()] = np.where(present, rng.random((7, 5)) < 0.7, 0.0)
     rows: list[int] = []
     features.of_other.register_forward_hook(lambda module, given, out: rows.append(len(given[0])))
     sparse = features(torch.from_numpy(seen))
-    weight = np.maximum(*(seen[:, getattr(features, n).numpy()] for n in ("_mask", "_wanted")))
+    weight = np.maximum(*(seen[:, getattr(features, n).numpy()] for n in ("_mask", "_has_target")))
     assert rows == [int(weight.sum())]
 
     slopes = torch.autograd.grad(sparse.square().sum(), list(features.parameters()))

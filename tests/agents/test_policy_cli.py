@@ -141,7 +141,7 @@ def test_a_blindfold_hides_the_others_and_nothing_else(mode):
     alone = layout.alone().reshape(2, -1)[0]
     for row in layout.index:
         here = slice(row["first"], row["last"] + 1)
-        kept = row["name"] in ("wanted", "target", "command", "heading", "motion")
+        kept = row["name"] in ("has_target", "target", "command", "heading", "motion")
         assert np.array_equal(blind[..., here], seen[..., here] if kept else
                               np.broadcast_to(alone[here], blind[..., here].shape))  # fmt: skip
 

@@ -402,7 +402,7 @@ def test_what_is_no_file_is_refused(tmp_path):
     (tmp_path / "zero.onnx").symlink_to("/dev/zero")
     (tmp_path / "zero.json").symlink_to("/dev/zero")
     (tmp_path / "text.txt").write_text("hello")
-    for wanted, reason in (
+    for name_or_path, reason in (
         (loop, "cannot be read"),
         (tmp_path / "folder.json", "cannot be read|expected an ordinary file"),
         (tmp_path / "pipe.onnx", "expected an ordinary file"),
@@ -415,7 +415,7 @@ def test_what_is_no_file_is_refused(tmp_path):
         ("x" * 5000, "cannot be read"),
     ):
         with pytest.raises(PolicyError, match=reason) as caught:
-            load_policy(wanted)
+            load_policy(name_or_path)
         assert str(caught.value).isprintable()
 
 

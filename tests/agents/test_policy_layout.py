@@ -58,8 +58,8 @@ def telling(layout):
 @pytest.mark.parametrize("history", [1, 3])
 @pytest.mark.parametrize("mode", MODES)
 def test_padded_is_what_an_environment_with_more_slots_sees(mode, history):
-    wanted, given_ = Layout(mode, 6, history), Layout(mode, 3, history)
-    pad, told = Padding(wanted, given_), telling(wanted)
+    required, given_ = Layout(mode, 6, history), Layout(mode, 3, history)
+    pad, told = Padding(required, given_), telling(required)
     for few, many in environments(mode, (3, 6), history):
         padded = pad(few.observations)
         assert np.array_equal(padded[..., told], many.observations[:, :3][..., told])
@@ -100,13 +100,13 @@ def test_padded_is_what_the_mode_writes_of_absent_cars(mode, few, more, history,
 
 @pytest.mark.parametrize("mode", MODES)
 def test_beams_end_the_observation_and_are_padded_as_they_are(mode):
-    wanted, given_ = Layout(mode, 6, 2, 8), Layout(mode, 3, 2, 8)
-    assert wanted.index[-1]["name"] == "near"
-    assert wanted.one == Layout(mode, 6, 2).one + 8
+    required, given_ = Layout(mode, 6, 2, 8), Layout(mode, 3, 2, 8)
+    assert required.index[-1]["name"] == "near"
+    assert required.one == Layout(mode, 6, 2).one + 8
     seen = np.random.default_rng(0).uniform(0.1, 1.0, given_.size).astype(np.float32)
-    padded = Padding(wanted, given_)(seen).reshape(2, -1)
+    padded = Padding(required, given_)(seen).reshape(2, -1)
     assert np.array_equal(padded[:, -8:], seen.reshape(2, -1)[:, -8:])
-    assert (wanted.alone().reshape(2, -1)[:, -8:] == 3.0).all()
+    assert (required.alone().reshape(2, -1)[:, -8:] == 3.0).all()
     parts = configure({"observation": mode, "history": 2, "n_cars": 3, "proximity": 8})
     assert Layout.of(parts) == given_
 
@@ -123,12 +123,12 @@ def test_other_beams_are_another_layout():
 
 
 def test_the_index_map_counts_every_number_once():
-    wanted, given_ = Layout("estimate_cov", 6, 4), Layout("estimate_cov", 3, 4)
-    where = wanted.padding_from(given_)
-    assert where.shape == (wanted.size,)
+    required, given_ = Layout("estimate_cov", 6, 4), Layout("estimate_cov", 3, 4)
+    where = required.padding_from(given_)
+    assert where.shape == (required.size,)
     assert sorted(where[where >= 0]) == list(range(given_.size))
-    same = wanted.padding_from(wanted)
-    assert np.array_equal(same, np.arange(wanted.size))
+    same = required.padding_from(required)
+    assert np.array_equal(same, np.arange(required.size))
 
 
 def test_digests_tell_layouts_apart_but_not_estimate_from_truth():
@@ -152,12 +152,12 @@ def test_digests_tell_layouts_apart_but_not_estimate_from_truth():
     ],
 )
 def test_what_does_not_fit_is_told(given_, reason):
-    wanted = Layout("estimate", 6)
-    told = wanted.refusal(given_)
+    required = Layout("estimate", 6)
+    told = required.refusal(given_)
     assert reason in told
     assert told.startswith("expected observation 'estimate' of 6 cars, got observation")
     with pytest.raises(ValueError, match=reason):
-        wanted.padding_from(given_)
+        required.padding_from(given_)
 
 
 def test_estimate_and_truth_may_be_exchanged():

@@ -73,18 +73,18 @@ def drive(seed, arguments=LIVELY):
     """Drive the RLlib form and the PettingZoo form with the same random actions, side by side."""
     ours, theirs = FormationMultiAgentEnv(arguments), FormationEnv(**arguments)
     rng = np.random.default_rng(seed)
-    (observations, infos), (wanted, _) = ours.reset(seed=seed), theirs.reset(seed=seed)
-    yield theirs, (observations, {}, {}, {}, infos), (wanted, {}, {}, {}, _)
+    (observations, infos), (expected, _) = ours.reset(seed=seed), theirs.reset(seed=seed)
+    yield theirs, (observations, {}, {}, {}, infos), (expected, {}, {}, {}, _)
     over = False
     while not over:
         actions = {a: rng.uniform(-1, 1, 2).astype(np.float32) for a in observations}
         # Actions of agents without observation are arbitrary, and have no effect.
         others = {a: rng.uniform(-1, 1, 2).astype(np.float32) for a in theirs.agents}
         found = ours.step({a: v for a, v in actions.items() if a in theirs.agents})
-        wanted = theirs.step({**others, **{a: v for a, v in actions.items() if a in others}})
+        expected = theirs.step({**others, **{a: v for a, v in actions.items() if a in others}})
         observations = found[0]
         over = found[2]["__all__"] or found[3]["__all__"]
-        yield theirs, found, wanted
+        yield theirs, found, expected
 
 
 @settings(max_examples=8)
@@ -99,20 +99,20 @@ def test_so_have_those_of_a_day_on_which_everything_happens(come_and_go):
 
 def check_keys(steps):
     left, before = set(), None
-    for theirs, found, wanted in steps:
+    for theirs, found, expected in steps:
         observations, rewards, terminated, truncated, infos = found
         for agent, row in observations.items():
-            assert row.tobytes() == wanted[0][agent].tobytes()
-            assert infos[agent] == wanted[4][agent]
+            assert row.tobytes() == expected[0][agent].tobytes()
+            assert infos[agent] == expected[4][agent]
             if before is not None:
-                assert rewards[agent] == wanted[1][agent]
-                assert terminated[agent] == wanted[2][agent]
-                assert truncated[agent] == wanted[3][agent]
+                assert rewards[agent] == expected[1][agent]
+                assert terminated[agent] == expected[2][agent]
+                assert truncated[agent] == expected[3][agent]
         over = not theirs.agents
-        missing = set(wanted[0]) - set(observations)
+        missing = set(expected[0]) - set(observations)
         # Exactly the agents that are away.
-        away = {a for a, info in wanted[4].items() if not info["present"]}
-        ending = {a for a, cut in wanted[3].items() if cut}
+        away = {a for a, info in expected[4].items() if not info["present"]}
+        ending = {a for a, cut in expected[3].items() if cut}
         assert missing == (set() if over else away - ending)
         assert not left & set(observations)
         left |= ending if before is not None else set()
@@ -240,15 +240,15 @@ def test_numbers_out_of_range_and_actions_that_it_cannot_learn_are_refused():
 
 
 @pytest.mark.parametrize(
-    ("wanted", "told"),
+    ("name_or_path", "told"),
     [
         (Path("rooms/mine.toml"), str(Path("rooms/mine.toml"))),
         (SCENARIOS["cars-nlos"], "cars-nlos"),
         ("cars-los", "cars-los"),
     ],
 )
-def test_what_is_recorded_of_a_scenario_is_text(wanted, told):
-    record = RllibConfig(arguments={"scenario": wanted, "task": "hold"}).record
+def test_what_is_recorded_of_a_scenario_is_text(name_or_path, told):
+    record = RllibConfig(arguments={"scenario": name_or_path, "task": "hold"}).record
     assert json.loads(json.dumps(record))["arguments"] == {"scenario": told, "task": "hold"}
 
 

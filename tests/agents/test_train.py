@@ -302,7 +302,7 @@ def test_the_order_of_the_others_does_not_matter(observation, history):
     first = 0
     for _ in range(history):
         for f in layout.fields:
-            if f.name in ("mask", "wanted"):
+            if f.name in ("mask", "has_target"):
                 seen[:, first : first + f.size] = rng.integers(0, 2, (7, f.size))
             if f.per_other:
                 pieces = seen[:, first : first + f.size].reshape(7, 4, -1)

@@ -160,9 +160,9 @@ class Faults:
         Median run; for a silent radio of four cars 1.07 for three seconds and 1.12 for ten.
         """
 
-        def of_the_others(constellation, t, cov, pos, wanted, taken):
+        def of_the_others(constellation, t, cov, pos, scored, taken):
             others = (constellation.pairs != BAD).all(axis=1)
-            return summarise(constellation, t, cov, pos, wanted & others, taken)
+            return summarise(constellation, t, cov, pos, scored & others, taken)
 
         summarise = bounds._summarise
         params, ratios = matched_params(recordable(self.scenario)), []

@@ -55,12 +55,12 @@ class Cars:
         self._got[1] = np.where(linked, self._wire[ago, 1, self._at[0], self._at[1]], self._got[1])
         self._quiet = np.where(linked, 0.0, self._quiet + DT)
         self._tick += 1
-        wanted, angle, drives = self._got
+        requested, angle, drives = self._got
         drives = (drives == 1.0) & (self._quiet < DEADMAN)
         turn = STEERING_RATE * DT
         self.steering += np.clip(angle - self.steering, -turn, turn)
         v = self.speed
-        asked = SPEED_GAIN * (np.where(drives, wanted, 0.0) - v)
+        asked = SPEED_GAIN * (np.where(drives, requested, 0.0) - v)
         # Brake against the motion, drive with the motor along it; a stop is full braking.
         ahead = np.where(v != 0.0, np.sign(v), np.sign(asked))
         driven = np.clip(asked * ahead, -self.brake, MAX_ACCEL) * ahead

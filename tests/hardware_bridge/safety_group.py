@@ -19,7 +19,7 @@ def picture(n_envs=1, n_cars=2, *, t=0.0, sigma=0.05, spacing=3.0) -> Picture:
     """Return cars in a row along x with headings along y, which request full speed."""
     q = blank_picture(n_envs, n_cars)
     q.t[:] = t
-    q.speed_wanted[:] = 3.0
+    q.requested_speed[:] = 3.0
     q.present[:] = q.oriented[:] = q.placed[:] = 1.0
     q.heading[:] = 0.5 * np.pi
     q.status[:] = Status.OK

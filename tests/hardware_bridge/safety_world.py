@@ -84,7 +84,7 @@ def run(params, n_envs, seconds, seed, *, n_cars=4, kinds=KINDS, sigma=(0.03, 0.
         if tick % DECISION == 0:
             new = estimates.picture(now, cars, present, DECISION * DT, faults)
             speed, steering = policies.decide(cars.pos, cars.heading, present)
-            new.speed_wanted[:], new.steering_wanted[:] = speed, steering
+            new.requested_speed[:], new.requested_steering[:] = speed, steering
             if picture is None:
                 picture = new
             takes = speaks & ~faults.held
@@ -98,7 +98,7 @@ def run(params, n_envs, seconds, seed, *, n_cars=4, kinds=KINDS, sigma=(0.03, 0.
         n_armings += int((gate.arm(now, present & ~gate.armed) & ~out.armed).sum())
         armed += out.armed.sum() / present.sum()
         capped += (
-            out.armed & (out.cap < np.minimum(np.abs(picture.speed_wanted), params.max_speed))
+            out.armed & (out.cap < np.minimum(np.abs(picture.requested_speed), params.max_speed))
         )[present].sum() / max(out.armed.sum(), 1)
         before = cars.pos.copy()
         cars.step(out.speed, out.steering, out.moving, linked)

@@ -52,11 +52,11 @@ def test_opening_moves_nothing(name):
 def test_what_is_said_is_what_is_read(name, speed, steering, is_back):
     driver, firmware = pair(name)
     firmware.feed(driver.opening())
-    wanted = -speed if is_back else speed
-    (reading,) = firmware.feed(driver.drive(wanted, steering))
+    requested = -speed if is_back else speed
+    (reading,) = firmware.feed(driver.drive(requested, steering))
     assert reading.to == "1"
     assert not reading.brake
-    assert reading.speed == pytest.approx(wanted, abs=0.01)
+    assert reading.speed == pytest.approx(requested, abs=0.01)
     assert reading.steering == pytest.approx(steering, abs=0.002)
 
 

@@ -227,15 +227,15 @@ def test_a_log_folder_reads_back_to_the_last_bit(block, tmp_path):
     log = read_log(tmp_path / "log")
     assert (log.name, log.source) == ("live", "swarm")
     assert log.skipped == {}
-    wanted = block.sorted()
+    expected = block.sorted()
     for name in ("t", "kind", "i", "j", "antenna_i", "antenna_j", "has_power"):
-        assert np.array_equal(getattr(log.block, name), getattr(wanted, name)), name
+        assert np.array_equal(getattr(log.block, name), getattr(expected, name)), name
     # Orientations are normalised, and missing powers are not written.
-    unsaid = (wanted.kind == Kind.RANGE) & ~wanted.has_power
+    unsaid = (expected.kind == Kind.RANGE) & ~expected.has_power
     values = np.where(
         unsaid[..., None] & (np.arange(N_VALUES) > 0),
         0.0,
-        wanted.values,
+        expected.values,
     )
     assert np.allclose(log.block.values, values, rtol=1e-15)
 

@@ -136,7 +136,7 @@ def test_a_recording_gives_the_same(tmp_path):
         feed.swarm.step(t_ns)
         if t_ns in seen:
             told = zip(feed.swarm.view._fields, feed.swarm.view, seen[t_ns], strict=True)
-            tasks = ("target", "wanted", "command")
+            tasks = ("target", "has_target", "command")
             assert all((a == b).all() for name, a, b in told if name not in tasks)
             n_same += 1
     assert n_same == 4
@@ -171,7 +171,7 @@ def test_it_sees_what_the_simulator_shows():
         swarm.take(Chunk("links.mocap", t_ns, encoder.encode(poses)))
         ones = np.ones(len(view.speed[0]))
         swarm.apply(view.speed[0], view.steering[0], ones, -ones)
-        swarm.share(view.target, view.wanted, view.command)
+        swarm.share(view.target, view.has_target, view.command)
         swarm.step(t_ns)
         mode.bind(swarm.view, out)()
         expected = np.stack([observations[a] for a in env.agents])

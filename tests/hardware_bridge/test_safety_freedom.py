@@ -38,11 +38,11 @@ class Estimated:
                 self.q.pos[:] = pos[:, None] - pos[:, :, None]
                 self.q.place[:] = pos
                 speed, steering = decide(pos, self.cars.heading, now[0])
-                self.q.speed_wanted[:], self.q.steering_wanted[:] = speed, steering
+                self.q.requested_speed[:], self.q.requested_steering[:] = speed, steering
             heard = np.repeat(now[:, None], shape[1], axis=1)
             self.out = self.gate.step(self.q, now, now, heard, everyone)
             self.gate.arm(now, everyone)
-            self.capped.append(self.out.cap + 1e-6 < np.abs(self.q.speed_wanted))
+            self.capped.append(self.out.cap + 1e-6 < np.abs(self.q.requested_speed))
             self.cars.step(self.out.speed, self.out.steering, self.out.moving, everyone)
             self.tick += 1
         return self.out

@@ -137,7 +137,7 @@ def test_commands_rise_no_faster_than_allowed_and_fall_at_once():
     group.tick(60)
     group.arm()
     speeds, angles = [0.0], [0.0]
-    group.q.steering_wanted[:] = 1.0
+    group.q.requested_steering[:] = 1.0
     for _ in range(30):
         out = group.tick()
         speeds.append(out.speed[0, 0])
@@ -146,9 +146,9 @@ def test_commands_rise_no_faster_than_allowed_and_fall_at_once():
     assert np.diff(speeds).max() <= p.max_accel * TICK + 1e-12
     assert np.diff(angles).max() <= p.max_steering_rate * TICK + 1e-12
     assert angles[-1] == p.max_steering
-    group.q.speed_wanted[:] = 0.0
+    group.q.requested_speed[:] = 0.0
     assert (group.tick().speed == 0.0).all()
-    group.q.speed_wanted[:] = -3.0
+    group.q.requested_speed[:] = -3.0
     assert group.tick().speed == pytest.approx(np.full((1, 2), -p.max_accel * TICK))
 
 
@@ -166,7 +166,7 @@ def test_what_is_no_number_moves_nothing_beyond_what_is_allowed(name, value):
         assert np.isfinite(out.steering).all()
         assert (np.abs(out.speed) <= p.max_speed).all()
         assert (np.abs(out.steering) <= p.max_steering).all()
-    if name in ("speed_wanted", "steering_wanted", "distance", "ranged", "vel"):
+    if name in ("requested_speed", "requested_steering", "distance", "ranged", "vel"):
         return  # commands, and values without effect while positions are known
     if name == "speed":
         assert (out.speed <= before.speed + 1e-9).all()
@@ -187,7 +187,7 @@ def test_one_of_a_batch_is_as_if_alone():
         now = np.full(n_envs, tick * TICK)
         if tick % 10 == 0:
             q = picture(n_envs, n_cars, t=tick * TICK, spacing=1.3)
-            for each in (q.speed_wanted, q.steering_wanted, q.speed):
+            for each in (q.requested_speed, q.requested_steering, q.speed):
                 each[:] = rng.uniform(-2.0, 2.0, each.shape)
             q.heading[:] = rng.uniform(-3.0, 3.0, q.heading.shape)
             q.place[:] = rng.uniform(0.2, 3.8, q.place.shape)
@@ -298,6 +298,6 @@ TestGates = Gates.TestCase
 def test_whatever_is_wanted_the_cap_holds(wishes):
     group = Driven(SafetyParams(fence=SQUARE), spacing=1.0).drive()
     for wish in wishes:
-        group.q.speed_wanted[:] = wish
+        group.q.requested_speed[:] = wish
         out = group.tick(3)
         assert (np.abs(out.speed) <= out.cap + 1e-12).all()

@@ -149,7 +149,7 @@ def test_silence_stops_all(drive):
 
 
 def test_pictures_that_were_overtaken_or_are_of_no_time_are_not_looked_at(drive):
-    old = drive.q._replace(t=drive.q.t - 0.05, speed_wanted=np.zeros((1, 2)))
+    old = drive.q._replace(t=drive.q.t - 0.05, requested_speed=np.zeros((1, 2)))
     drive.supervisor.take(Decision(old))
     drive.supervisor.take(Decision(old._replace(t=np.full(1, np.nan))))
     assert stands(drive.tick(1, talk=False)) == [False, False]

@@ -171,13 +171,13 @@ def test_any_numbers_come_through(echo, spoken, time, key):
         assert met[:6] == (message.type, key is not None, 65535, 1, k, time)
         places = [field for field in message.fields for _ in range(field.n)]
         rows = data[1:] if message.repeated else data
-        wanted = []
+        expected = []
         while rows:
             for field in places:
                 signed = field.type[0] == "i"
-                wanted.append(int.from_bytes(rows[: field.size], "little", signed=signed))
+                expected.append(int.from_bytes(rows[: field.size], "little", signed=signed))
                 rows = rows[field.size :]
-        assert list(met[6:]) == wanted
+        assert list(met[6:]) == expected
 
 
 @pytest.mark.parametrize("key", [None, KEY])

@@ -80,15 +80,15 @@ def damage(seed, n, key):
     frames = spread(seed, n, key)
     sent = {repr(r) for r in said(frames, key)[0]}
     decoder, last = RelposDecoder(key), frames[-1]
-    wanted = said([last], key)[0]
-    assert wanted
+    expected = said([last], key)[0]
+    assert expected
     for coded in frames[:-1]:
         bad = mutate(rng, coded)
         met = decoder.feed(bad)
         assert decoder.waiting <= MOST_WAITING
         if rng.random() < 0.1:
             met += decoder.feed(last)
-            assert met[-len(wanted) :] == wanted
+            assert met[-len(expected) :] == expected
         assert all(repr(reading) in sent for reading in met)
     return decoder.counts
 
@@ -101,11 +101,11 @@ def test_a_damaged_frame_is_never_a_wrong_one(key):
 
 def test_the_frame_after_damage_is_read():
     first, good = (RelposEncoder(1, 2).encode([HeartbeatReading(NOW)] * n) for n in (8, 1))
-    wanted = said([good])[0]
+    expected = said([good])[0]
     for at in range(len(first)):
-        assert said([first[:at], good])[0][-1:] == wanted
+        assert said([first[:at], good])[0][-1:] == expected
     for garbage in (b"\xff", b"\1" * 515, b"\xff" * 516, b"\x02" * 9999):
-        assert said([garbage, good])[0] == wanted
+        assert said([garbage, good])[0] == expected
 
 
 def test_what_is_kept_is_bounded():

@@ -29,8 +29,8 @@ def test_cars_start_and_stand_where_they_are_asked_to():
     env.reset(seed=1, options={"poses": POSES, "goals": goals})
     np.testing.assert_allclose(env.formation.state.pos_w[0], np.array(POSES)[:, :2], atol=0.02)
     np.testing.assert_allclose(env.formation.task.goal_w[0], goals, atol=1e-12)
-    wanted = np.array(goals)[None, :] - np.array(goals)[:, None]
-    np.testing.assert_allclose(env.formation.task.target[0], wanted, atol=1e-12)
+    expected = np.array(goals)[None, :] - np.array(goals)[:, None]
+    np.testing.assert_allclose(env.formation.task.target[0], expected, atol=1e-12)
     env.reset()
     assert np.abs(env.formation.state.pos_w[0] - np.array(POSES)[:, :2]).max() > 0.1
     meeting = FormationGymEnv(task="rendezvous")

@@ -21,7 +21,7 @@ class Follower:
 
     def act(self, seen, blind=False):
         part = {name: seen[at] for name, at in self._at.items()}
-        ok = part["mask"] * part["wanted"] * (not blind)
+        ok = part["mask"] * part["has_target"] * (not blind)
         off = (part["pos"] - part["target"]).reshape(-1, 2)
         trim = ok @ off / max(ok.sum(), 1.0)
         ahead, left = part["command"] + 0.8 * np.clip(trim, -1.0, 1.0)

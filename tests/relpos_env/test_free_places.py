@@ -20,8 +20,8 @@ def clearance(anchor, boxes):
 
 
 def test_it_stays_where_it_is_wanted_if_that_is_clear():
-    wanted = np.array([-1.03, 0.21])
-    np.testing.assert_array_equal(free_anchor(wanted, HALF, SQUARE, BOX), wanted)
+    requested = np.array([-1.03, 0.21])
+    np.testing.assert_array_equal(free_anchor(requested, HALF, SQUARE, BOX), requested)
     outside = free_anchor(np.array([-5.0, 0.0]), HALF, SQUARE, BOX)
     np.testing.assert_array_equal(outside, [-2.0, 0.0])
     gone = np.zeros((2, 6))  # boxes of size zero are absent
@@ -29,14 +29,14 @@ def test_it_stays_where_it_is_wanted_if_that_is_clear():
 
 
 def test_it_makes_way_by_no_more_than_it_must():
-    for wanted in np.random.default_rng(0).uniform(-1.0, 1.0, (30, 2)):
-        found = free_anchor(wanted, HALF, SQUARE, BOX)
+    for requested in np.random.default_rng(0).uniform(-1.0, 1.0, (30, 2)):
+        found = free_anchor(requested, HALF, SQUARE, BOX)
         assert clearance(found, BOX) >= CLEAR
-        shift = np.linalg.norm(found - wanted)
+        shift = np.linalg.norm(found - requested)
         directions = np.linspace(0.0, 2.0 * np.pi, 90)
         ring = np.stack([np.cos(directions), np.sin(directions)], axis=1)
         for nearer in np.arange(0.0, shift - STEP, 0.02):
-            assert all(clearance(wanted + nearer * d, BOX) < CLEAR for d in ring)
+            assert all(clearance(requested + nearer * d, BOX) < CLEAR for d in ring)
 
 
 def test_where_nothing_is_clear_it_is_the_clearest():

@@ -47,8 +47,8 @@ def test_cars_that_head_for_each_other_do_not_touch():
                 other = pos[1 - k] - pos[k] if k < 2 else np.zeros(2)
                 turn = np.arctan2(other[1], other[0]) - heading[k]
                 turn = (turn + np.pi) % (2.0 * np.pi) - np.pi
-                wanted = [0.5, np.clip(turn, -1.0, 1.0)] if k < 2 else [0.0, 0.0]
-                actions[agent] = np.array(wanted, np.float32)
+                commanded = [0.5, np.clip(turn, -1.0, 1.0)] if k < 2 else [0.0, 0.0]
+                actions[agent] = np.array(commanded, np.float32)
             env.step(actions)
             pos = env.formation.state.pos_w[0]
             least = min(least, np.linalg.norm(pos[0] - pos[1]))

@@ -78,11 +78,11 @@ def test_who_is_an_agent_when(life):
     names = env.possible_agents
     joins, gone = first_cycle(2.0), first_cycle(4.5)
     for cycle, (agents, observations, *results, infos) in enumerate(rows[:-1]):
-        wanted = {names[DARK], names[RETURNS]}
-        wanted |= {names[NEW]} if cycle >= joins else set()
-        wanted |= {names[LEAVES]} if cycle < gone else set()
-        assert set(agents) == wanted
-        concerned = wanted | ({names[LEAVES]} if cycle == gone else set())
+        expected = {names[DARK], names[RETURNS]}
+        expected |= {names[NEW]} if cycle >= joins else set()
+        expected |= {names[LEAVES]} if cycle < gone else set()
+        assert set(agents) == expected
+        concerned = expected | ({names[LEAVES]} if cycle == gone else set())
         assert set(observations) == set(infos) == concerned
         for result in results[: 3 if cycle else 0]:
             assert set(result) == concerned

@@ -50,7 +50,7 @@ def random_view(seed, far=1.0):
     turns = rng.uniform(-0.3, 0.3, (E, N))
     bind_view(view, estimate, powered, turns)()
     view.present[:] = rng.random((E, N)) < 0.8
-    view.wanted[:] = rng.random(view.wanted.shape) < 0.6
+    view.has_target[:] = rng.random(view.has_target.shape) < 0.6
     view.target[:] = far * rng.normal(0.0, 2.0, view.target.shape)
     view.command[:] = far * rng.normal(0.0, 1.0, view.command.shape)
     view.speed[:] = far * rng.normal(0.0, 1.0, view.speed.shape)
@@ -59,7 +59,7 @@ def random_view(seed, far=1.0):
     view.heard[:] = view.now[:, None, None] - rng.uniform(0.0, 15.0, view.heard.shape)
     view.gap[:] = far * rng.normal(8.0, 4.0, view.gap.shape)
     for k in range(N):
-        view.wanted[:, k, k] = False
+        view.has_target[:, k, k] = False
     return view, estimate, powered, turns
 
 
@@ -118,8 +118,10 @@ def twin(name, view, e, a):
         "status": np.eye(6)[view.status[e, a, others]],
         "range": fresh * view.distance[e, a, others],
         "gap": fresh * view.gap[e, a, others],
-        "wanted": view.wanted[e, a, others],
-        "target": [view.wanted[e, a, b] * turned(view, e, a, view.target[e, a, b]) for b in others],
+        "has_target": view.has_target[e, a, others],
+        "target": [
+            view.has_target[e, a, b] * turned(view, e, a, view.target[e, a, b]) for b in others
+        ],
         "command": turned(view, e, a, view.command[e, a]),
         "heading": view.oriented[e, a] * np.array([c, s]),
         "motion": [view.speed[e, a], view.steering[e, a]],
@@ -149,10 +151,10 @@ def test_observations_are_what_the_fields_say(name, far):
             if not view.present[e, a]:
                 assert not out[e, a].any()
                 continue
-            wanted = twin(name, view, e, a)
+            has_target = twin(name, view, e, a)
             for field, row in zip(mode.fields, table, strict=True):
                 seen = out[e, a, row["first"] : row["last"] + 1]
-                value = np.clip(np.ravel(wanted[field.name]), -field.limit, field.limit)
+                value = np.clip(np.ravel(has_target[field.name]), -field.limit, field.limit)
                 np.testing.assert_allclose(seen, value, rtol=2e-6, atol=2e-6, err_msg=field.name)
 
 

@@ -223,8 +223,8 @@ def drive(n_envs=1, steps=12, **arguments):
         formation.begin([e])
     seen = []
     for k in range(steps):
-        wanted = np.full((n_envs, parts.n_cars), 1.0)
-        formation.step(wanted, 0.3 * math.sin(k) * wanted)
+        commanded = np.full((n_envs, parts.n_cars), 1.0)
+        formation.step(commanded, 0.3 * math.sin(k) * commanded)
         seen.append(formation.observations.copy())
     return np.array(seen), formation
 
@@ -270,8 +270,8 @@ def test_a_batch_is_its_environments():
         alone.seed(0, np.random.default_rng(e))
         alone.begin([0])
         for k in range(len(batch)):
-            wanted = np.full((1, parts.n_cars), 1.0)
-            alone.step(wanted, 0.3 * math.sin(k) * wanted)
+            commanded = np.full((1, parts.n_cars), 1.0)
+            alone.step(commanded, 0.3 * math.sin(k) * commanded)
             assert alone.observations[0].tobytes() == batch[k, e].tobytes()
     absent = ~alone.state.present[0]
     assert not batch[-1, 2][absent].any()

@@ -78,8 +78,8 @@ def test_seats_are_the_agents_of_the_pettingzoo_form(kwargs):
         check_seats(env, observations, trace[0][rows])
         for (seen, rewards, dones, infos), actions in zip(trace[1:], taken, strict=True):
             seats = {f"car_{k}": row for k, row in enumerate(range(n * e, n * e + n))}
-            wanted = {a: actions[seats[a]] for a in env.agents}
-            observations, reward, terminated, truncated, told = env.step(wanted)
+            commanded = {a: actions[seats[a]] for a in env.agents}
+            observations, reward, terminated, truncated, told = env.step(commanded)
             for agent, row in seats.items():
                 assert rewards[row] == np.float32(reward.get(agent, 0.0))
                 over = terminated.get(agent, False) or truncated.get(agent, False)

@@ -105,8 +105,8 @@ def test_imu_noise_grows_with_speed_to_what_is_asked(speed):
 def test_imu_biases_are_as_large_as_asked_and_the_slow_part_stays_so():
     p = replace(EXACT, gyr_bias=0.01, acc_bias=0.3, gyr_drift=0.004, acc_drift=0.1, drift_tau=2.0)
     imus = Imus(p, 800)
-    wanted = np.repeat([0.01, 0.3], 3)
-    np.testing.assert_allclose(imus.bias[0].std(axis=0), wanted, rtol=0.1)
+    expected = np.repeat([0.01, 0.3], 3)
+    np.testing.assert_allclose(imus.bias[0].std(axis=0), expected, rtol=0.1)
     before = imus.drift[0].copy()
     slow = np.repeat([0.004, 0.1], 3)
     np.testing.assert_allclose(before.std(axis=0), slow, rtol=0.1)

@@ -117,8 +117,8 @@ def posterior_bound(
     coefficients = as_records(coefficients)
     pos, known = log.truth.positions(constellation, t_out)
     pos = np.nan_to_num(pos[..., :d])
-    wanted = _wanted(constellation, known)
-    yaw, weight = _yaw_generators(constellation, pos, wanted)
+    scored = _scored_pairs(constellation, known)
+    yaw, weight = _yaw_generators(constellation, pos, scored)
     events = (block.t, block.kind, block.i, block.j, block.antenna_i, block.antenna_j, block.values)
     variance = run_bound(
         coefficients,
@@ -134,7 +134,7 @@ def posterior_bound(
         cov,
     )
     taken = variance / weight if weight > 0.0 else 0.0
-    return _summarise(constellation, t_out, cov, pos, wanted, taken)
+    return _summarise(constellation, t_out, cov, pos, scored, taken)
 
 
 def recorded_bound(
@@ -200,20 +200,20 @@ def _with_a_row_more(state: JointState, coefficients: Records) -> JointState:
     )
 
 
-def _wanted(constellation: Constellation, known: Bool) -> Bool:
+def _scored_pairs(constellation: Constellation, known: Bool) -> Bool:
     """Return a mask of scored pairs, (time, pair): both positions known, one node moving."""
     i, j = constellation.pairs.T
     moving = ~constellation.is_static[constellation.pairs].all(axis=1)
     return np.asarray(known[:, i] & known[:, j] & moving)
 
 
-def _yaw_generators(constellation: Constellation, pos: F64, wanted: Bool) -> tuple[F64, float]:
+def _yaw_generators(constellation: Constellation, pos: F64, scored: Bool) -> tuple[F64, float]:
     """Compute the effect of a yaw of all relative positions, summed over the scored pairs.
 
     Args:
         constellation: Nodes of the run.
         pos: True positions, (time, node, d) [m].
-        wanted: Mask of scored pairs, (time, pair).
+        scored: Mask of scored pairs, (time, pair).
 
     Returns:
         Coefficients of the position errors in ``sum over pairs (z x x_ij) . e_ij``, (time,
@@ -223,7 +223,7 @@ def _yaw_generators(constellation: Constellation, pos: F64, wanted: Bool) -> tup
     relative = pos[:, j] - pos[:, i]
     turned = np.zeros_like(relative)
     turned[..., 0], turned[..., 1] = -relative[..., 1], relative[..., 0]
-    turned *= wanted[..., None]
+    turned *= scored[..., None]
     yaw = np.zeros_like(pos)
     for p in range(constellation.n_pairs):
         yaw[:, j[p]] += turned[:, p]
@@ -232,7 +232,7 @@ def _yaw_generators(constellation: Constellation, pos: F64, wanted: Bool) -> tup
 
 
 def _summarise(
-    constellation: Constellation, t: F64, cov: F64, pos: F64, wanted: Bool, taken: float
+    constellation: Constellation, t: F64, cov: F64, pos: F64, scored: Bool, taken: float
 ) -> Bound:
     """Compute errors of pairs from covariances of positions.
 
@@ -241,7 +241,7 @@ def _summarise(
         t: Times, (time) [s].
         cov: Covariance of all positions, (time, node * d, node * d) [m2].
         pos: True positions, (time, node, d) [m].
-        wanted: Mask of scored pairs, (time, pair).
+        scored: Mask of scored pairs, (time, pair).
         taken: Part of the sum of squared errors that the best constant yaw removes [m2].
     """
     n, d = constellation.n_nodes, constellation.dimensions
@@ -254,17 +254,17 @@ def _summarise(
     variance = np.diagonal(pair_cov, axis1=1, axis2=2).reshape(len(t), -1, d).sum(axis=2)
     shape = np.zeros(len(t))
     for k in range(len(t)):
-        used = np.repeat(wanted[k], d)
+        used = np.repeat(scored[k], d)
         generators = _rotations((pos[k, j] - pos[k, i]).reshape(-1, d), d)[used]
-        left, pairs = pair_cov[k][np.ix_(used, used)], max(int(wanted[k].sum()), 1)
+        left, pairs = pair_cov[k][np.ix_(used, used)], max(int(scored[k].sum()), 1)
         shape[k] = _beside(left, generators) / pairs
-    counted, total = wanted.any(axis=1), max(int(wanted.sum()), 1)
-    after_yaw = max(float(variance[wanted].sum()) - taken, 0.0) / total
+    counted, total = scored.any(axis=1), max(int(scored.sum()), 1)
+    after_yaw = max(float(variance[scored].sum()) - taken, 0.0) / total
     return Bound(
         t=t,
         pair_rms=np.sqrt(variance),
         shape_rms=np.sqrt(np.maximum(shape, 0.0)),
-        rmse=float(np.sqrt(variance[wanted].mean())),
+        rmse=float(np.sqrt(variance[scored].mean())),
         rmse_yaw=float(np.sqrt(after_yaw)),
         rmse_shape=float(np.sqrt(np.maximum(shape[counted], 0.0).mean())),
     )

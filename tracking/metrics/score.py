@@ -87,12 +87,12 @@ def score(estimate: TeamEstimate, truth_ij_w: F64, has_truth: Bool, skip_until: 
     constellation = estimate.constellation
     planar = constellation.dimensions == 2
     moving = ~constellation.is_static[constellation.pairs].all(axis=1)
-    wanted = has_truth & moving & (estimate.t >= skip_until)[:, None]
-    scored = wanted & ~np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
+    eligible = has_truth & moving & (estimate.t >= skip_until)[:, None]
+    scored = eligible & ~np.isin(estimate.status, (Status.ABSENT, Status.STARTING))
     coverage = ok_share = None
-    if wanted.any():
-        coverage = float(scored.sum() / wanted.sum())
-        ok_share = float((wanted & estimate.ok).sum() / wanted.sum())
+    if eligible.any():
+        coverage = float(scored.sum() / eligible.sum())
+        ok_share = float((eligible & estimate.ok).sum() / eligible.sum())
     rows = scored.any(axis=1)
     x, truth, scored = estimate.pos_ij_w[rows], truth_ij_w[rows], scored[rows]
     n_pairs = constellation.n_pairs

@@ -25,5 +25,5 @@ def check_numbers(params: object, *, may_be_zero: Iterable[str] = ()) -> None:
             continue
         low = f.name in may_be_zero
         if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not low):
-            wanted = "of 0 or more" if low else "above 0"
-            raise ConfigError(f"{f.name}: expected a number {wanted}, got {value}")
+            allowed = "of 0 or more" if low else "above 0"
+            raise ConfigError(f"{f.name}: expected a number {allowed}, got {value}")

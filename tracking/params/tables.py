@@ -109,9 +109,9 @@ class TableReader:
             raise _placed(error, where, [f.name for f in fields(kind)]) from error  # type: ignore
 
     def _preset(self, preset: Preset, value: object, where: Where) -> Any:
-        wanted = self._value(preset.kind, value, where, None)
+        selected = self._value(preset.kind, value, where, None)
         try:
-            return preset.find(wanted)
+            return preset.find(selected)
         except where.raises as error:
             raise where.error(str(error).removeprefix(f"{preset.key}: ")) from error
 

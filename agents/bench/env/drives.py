@@ -32,13 +32,13 @@ def followed(formation: EnvCore) -> F64:
     2 sin(e) / d (Coulter, CMU-RI-TR-92-01) and the steering is atan(wheelbase curvature).
     """
     state, task = formation.state, formation.task
-    wanted = formation.operator.command + PULL * (task.goal_w - state.pos_w)
-    off = np.arctan2(wanted[..., 1], wanted[..., 0]) - state.heading
+    desired = formation.operator.command + PULL * (task.goal_w - state.pos_w)
+    off = np.arctan2(desired[..., 1], desired[..., 0]) - state.heading
     off = np.arctan2(np.sin(off), np.cos(off))
     wheelbase = formation.parts.scenario.car.wheelbase
     turn = np.sin(np.clip(off, -0.5 * np.pi, 0.5 * np.pi))
     steering = np.arctan(wheelbase * 2.0 * turn / LOOKAHEAD)
-    speed = np.linalg.norm(wanted, axis=-1) * np.clip(np.cos(off), 0.3, 1.0)
+    speed = np.linalg.norm(desired, axis=-1) * np.clip(np.cos(off), 0.3, 1.0)
     return _shares(speed, steering)
 
 

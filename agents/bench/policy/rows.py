@@ -43,14 +43,14 @@ def bench_policy(
     """
     formation = _room()
     seen = Layout.of(formation.parts)
-    wanted = Layout(seen.observation, SLOTS)
-    peer, own = Perceptron(wanted), Perceptron(seen)
+    required = Layout(seen.observation, SLOTS)
+    peer, own = Perceptron(required), Perceptron(seen)
     one = formation.observations[0, 0].copy()
     many = np.tile(formation.observations, (BATCH, 1, 1))
     drivers: dict[str, tuple[Driver, Driver, F32, int]] = {
         "one car": (own.policy(), own, one, steps),
         f"one car of {SLOTS} slots, three cars": (
-            peer.policy().driver(seen), PaddedDriver(peer, wanted, seen), one, steps,
+            peer.policy().driver(seen), PaddedDriver(peer, required, seen), one, steps,
         ),
         f"{BATCH * 3} cars": (own.policy(), own, many, max(steps // 20, 1)),
     }  # fmt: skip

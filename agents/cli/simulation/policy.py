@@ -37,15 +37,15 @@ def list_policies(as_json: bool) -> None:
 
 
 @policy.command("show")
-@click.argument("wanted", metavar="NAME_OR_PATH")
+@click.argument("name_or_path", metavar="NAME_OR_PATH")
 @click.option(
     "--json", "as_json", is_flag=True, help="Print the card as one JSON object, nothing else."
 )
-def show(wanted: str, as_json: bool) -> None:
+def show(name_or_path: str, as_json: bool) -> None:
     """Check a policy and print its card."""
     from agents.policies import load_policy
 
-    card = load_policy(wanted).card
+    card = load_policy(name_or_path).card
     if as_json:
         emit_json([json.loads(card.to_json())])
         return

@@ -32,7 +32,7 @@ class DriveLog:
         n, room = bridge.config.n_slots, min(cycles, MOST_KEPT)
         self._t_ns = np.full(room, -1, dtype=np.int64)
         self._target = np.full((room, n, n, 2), np.nan)
-        self._wanted = np.full((room, n, n), True)
+        self._has_target = np.full((room, n, n), True)
         self._error, self._lag = np.full((2, room), np.nan)
         self._command, self._passed = np.full((2, room, n, 2), np.nan)
 
@@ -48,7 +48,7 @@ class DriveLog:
         self._began_ns = self._began_ns if self._n else group.t_ns
         self._n += 1
         self._t_ns[k] = group.t_ns
-        self._target[k], self._wanted[k] = task.target[0], task.has_target[0]
+        self._target[k], self._has_target[k] = task.target[0], task.has_target[0]
         self._error[k] = task.error[0, present].mean() if present.any() else np.nan
         self._command[k] = group.asked
         self._passed[k] = 0.0
@@ -72,7 +72,7 @@ class DriveLog:
             t_ns=self._t_ns[order],
             began_ns=self._began_ns,
             target=self._target[order],
-            wanted=self._wanted[order],
+            has_target=self._has_target[order],
             error=self._error[order],
             command=self._command[order],
             passed=self._passed[order],

@@ -30,7 +30,7 @@ class DriveResult:
     """[ns] Host time of the first decision of the drive."""
     target: F64
     """[m] Target positions relative to each car, (decision, slot, other, 2)."""
-    wanted: Bool
+    has_target: Bool
     """True where the task defines a target, (decision, slot, other)."""
     error: F64
     """[m] Estimated formation error, mean over the cars, (decision)."""

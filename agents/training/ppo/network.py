@@ -71,7 +71,7 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         self._keep("others", where.others.ravel())
         self._keep("own", own)
         self._keep("mask", where.newest["mask"])
-        self._keep("wanted", where.newest["wanted"])
+        self._keep("has_target", where.newest["has_target"])
         self._has_places, self._has_beams = where.places is not None, where.near is not None
         self.skips_absent = True
         """True if other cars with zero weight are skipped, which only affects the run time."""
@@ -100,8 +100,8 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
             both = known * seen.index_select(1, self._place_wanted) / ERROR_SCALE
             error = self._by_other((off * both).clamp(-LIMIT, LIMIT))
             others = torch.cat([others, error], dim=-1)
-        known, wanted = seen.index_select(1, self._mask), seen.index_select(1, self._wanted)
-        weight = (known + wanted).clamp(max=1.0)
+        known, has_target = seen.index_select(1, self._mask), seen.index_select(1, self._has_target)
+        weight = (known + has_target).clamp(max=1.0)
         count = weight.sum(dim=1, keepdim=True)
         mean = self._sum_of(others, weight) / count.clamp(min=1.0)
         own = scaled.index_select(1, self._own)
@@ -192,14 +192,14 @@ class _Where:
         self.own = _join([stands[f.name] for f in fields if not f.per_other])[0]
         self.near = stands["near"].ravel() if "near" in stands else None
         # A car is valid if its newest observation has a position or a target.
-        self.newest = {n: np.ascontiguousarray(stands[n][0, :, 0]) for n in ("mask", "wanted")}
+        self.newest = {n: np.ascontiguousarray(stands[n][0, :, 0]) for n in ("mask", "has_target")}
         self.gain = np.ones(self.size, np.float32)
         for f in fields:
             self.gain[stands[f.name].ravel()] = 1.0 / SCALES.get(f.name, 1.0)
         self.places: dict[str, I64] | None = None
         if "pos" in stands:
             # For each coordinate of each observation: position, target and their masks.
-            twice = {n: np.repeat(stands[n], 2, axis=-1) for n in ("mask", "wanted")}
+            twice = {n: np.repeat(stands[n], 2, axis=-1) for n in ("mask", "has_target")}
             named = {"pos": stands["pos"], "target": stands["target"], **twice}
             self.places = {f"place_{n}": _join([index]) for n, index in named.items()}
 

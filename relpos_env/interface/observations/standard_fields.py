@@ -11,7 +11,7 @@ def wish_fields(n_others: int) -> tuple[Field, ...]:
     """Return the fields of the relative targets of the other cars."""
     return (
         Field(
-            "wanted",
+            "has_target",
             n_others,
             "-",
             "1 where the task gives that car a place",

@@ -18,9 +18,9 @@ PLACE_RADIUS = 0.45
 def draw_formation(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
     """Draw circles at the relative targets, joined by a pale outline of the formation."""
     viewer = snapshot.viewer
-    wanted = np.asarray(snapshot.has_target) & snapshot.present
-    wanted[viewer] = False
-    cars = np.flatnonzero(wanted)
+    has_target = np.asarray(snapshot.has_target) & snapshot.present
+    has_target[viewer] = False
+    cars = np.flatnonzero(has_target)
     if not snapshot.present[viewer] or len(cars) == 0:
         return
     places = snapshot.pose[viewer, :2] + snapshot.target[cars]
@@ -28,7 +28,7 @@ def draw_formation(canvas: Canvas, layout: Layout, snapshot: Snapshot) -> None:
     offset = corners - corners.mean(axis=0)
     order = np.argsort(np.arctan2(offset[:, 1], offset[:, 0]), kind="stable")
     outline = layout.pixels(corners[order])
-    canvas.lines(outline, palette.WANTED, 4.0, closed=True)
+    canvas.lines(outline, palette.TARGET, 4.0, closed=True)
     radius = PLACE_RADIUS * snapshot.car_size[0] * layout.scale
     for car, place in zip(cars.tolist(), layout.pixels(places), strict=True):
         draw_place(canvas, place, radius, palette.car_colour(car))

@@ -13,13 +13,13 @@ STEP = 0.1
 """[m] Grid spacing of the candidate anchors."""
 
 
-def free_anchor(wanted: F64, half: F64, places: F64, boxes: F64) -> F64:
+def free_anchor(requested: F64, half: F64, places: F64, boxes: F64) -> F64:
     """Return the anchor nearest to a requested one with all slots at least `CLEAR` from boxes.
 
     If there is none, return the candidate with the largest clearance.
 
     Args:
-        wanted: Requested middle of the formation, (2) [m].
+        requested: Requested middle of the formation, (2) [m].
         half: Maximum distance from the room's middle along x and y, (2) [m].
         places: Slots relative to the middle, in the world's axes, (slot, 2) [m].
         boxes: Boxes in the room, (box, 6); boxes of zero size are ignored.
@@ -28,16 +28,16 @@ def free_anchor(wanted: F64, half: F64, places: F64, boxes: F64) -> F64:
         Anchor, (2) [m].
     """
     boxes = boxes[boxes[:, 2] > 0.0]
-    wanted = np.clip(wanted, -half, half)
-    if _clearance(wanted[None], places, boxes)[0] >= CLEAR:
-        return wanted  # the usual case in large rooms, where the search is slow
+    requested = np.clip(requested, -half, half)
+    if _clearance(requested[None], places, boxes)[0] >= CLEAR:
+        return requested  # the usual case in large rooms, where the search is slow
     axes = [np.linspace(-h, h, 2 * int(np.ceil(h / STEP)) + 1) for h in half]
     tried = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     clear = _clearance(tried, places, boxes)
     free = np.flatnonzero(clear >= CLEAR)
     if not len(free):
         free = np.array([np.argmax(clear)])
-    nearest: F64 = tried[free[np.argmin(np.linalg.norm(tried[free] - wanted, axis=1))]]
+    nearest: F64 = tried[free[np.argmin(np.linalg.norm(tried[free] - requested, axis=1))]]
     return nearest
 
 

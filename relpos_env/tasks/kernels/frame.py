@@ -117,14 +117,14 @@ def update_frame(
                 goal[env, k, 0] = goal[env, k, 1] = 0.0
                 plan[env, k, 0] = plan[env, k, 1] = 0.0
                 continue
-            o_x, o_y, told = places[env, k, 0], places[env, k, 1], places[env, k, 2]
+            o_x, o_y, informed = places[env, k, 0], places[env, k, 1], places[env, k, 2]
             goal[env, k, 0] = x + c * o_x - s * o_y
             goal[env, k, 1] = y + s * o_x + c * o_y
-            wanted_x = v_x - turn * (s_a * o_x + c_a * o_y)
-            wanted_y = v_y + turn * (c_a * o_x - s_a * o_y)
-            plan[env, k, 0], plan[env, k, 1] = told * wanted_x, told * wanted_y
+            reference_x = v_x - turn * (s_a * o_x + c_a * o_y)
+            reference_y = v_y + turn * (c_a * o_x - s_a * o_y)
+            plan[env, k, 0], plan[env, k, 1] = informed * reference_x, informed * reference_y
             # Cars without the plan have the velocity term too.
-            velocity_term(env, k, vel, wanted_x, wanted_y, rewards)
+            velocity_term(env, k, vel, reference_x, reference_y, rewards)
         if place_scale > 0.0:
             place_term(env, pos, present, goal, place_scale, rewards)
         targets_from_goals(env, present, goal, target)

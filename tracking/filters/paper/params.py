@@ -72,5 +72,5 @@ class PaperParams:
         check_numbers(self)
         for name, values in CHOICES.items():
             if getattr(self, name) not in values:
-                wanted = " or ".join(map(repr, values))
-                raise ConfigError(f"{name}: expected {wanted}, got {getattr(self, name)!r}")
+                allowed = " or ".join(map(repr, values))
+                raise ConfigError(f"{name}: expected {allowed}, got {getattr(self, name)!r}")
