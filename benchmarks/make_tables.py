@@ -147,10 +147,10 @@ def weights() -> str:
 
 def arguments() -> str:
     """Return the table of the fields of a configuration."""
-    told = docstrings(config.FormationConfig)
+    meanings = docstrings(config.FormationConfig)
     rows = []
     for f in fields(config.FormationConfig):
-        rows.append([f"`{f.name}`", f"`{default_of(f)}`", told[f.name]])
+        rows.append([f"`{f.name}`", f"`{default_of(f)}`", meanings[f.name]])
     return markdown(("argument", "default", "meaning"), rows)
 
 
@@ -167,14 +167,14 @@ def docstrings(cls: type) -> dict[str, str]:
     """Return the docstrings of the fields of a dataclass or enum, each in one line."""
     (body,) = ast.parse(inspect.getsource(cls)).body
     assert isinstance(body, ast.ClassDef)
-    told = {}
+    meanings = {}
     for line, below in zip(body.body, body.body[1:], strict=False):
         if not isinstance(line, ast.Assign | ast.AnnAssign) or not isinstance(below, ast.Expr):
             continue
         target = line.target if isinstance(line, ast.AnnAssign) else line.targets[0]
         if isinstance(target, ast.Name) and isinstance(below.value, ast.Constant):
-            told[target.id] = " ".join(str(below.value.value).split())
-    return told
+            meanings[target.id] = " ".join(str(below.value.value).split())
+    return meanings
 
 
 def scenarios() -> str:
@@ -202,8 +202,8 @@ def drawn(s: Scenario) -> str:
     ]
     _, nearest = min(least)
     differ = [n for n in own if getattr(s.randomisation, n) != getattr(LEVELS[nearest], n)]
-    told = ", ".join(f"{n} {getattr(s.randomisation, n)}" for n in differ)
-    return f"level {nearest}, {told}"
+    changes = ", ".join(f"{n} {getattr(s.randomisation, n)}" for n in differ)
+    return f"level {nearest}, {changes}"
 
 
 def training() -> str:
@@ -219,8 +219,8 @@ def training() -> str:
 def driver(name: str) -> str:
     """Return the table of the options of a motor driver."""
     options = DRIVERS[name].options
-    told = docstrings(options)
-    rows = [[f"`{f.name}`", f"`{default_of(f)}`", told[f.name]] for f in fields(options)]
+    meanings = docstrings(options)
+    rows = [[f"`{f.name}`", f"`{default_of(f)}`", meanings[f.name]] for f in fields(options)]
     return markdown(("option", "default", "meaning"), rows)
 
 
@@ -243,13 +243,13 @@ def safety_rules() -> str:
     for rule in RULES:
         does = inspect.getdoc(rule.check) or ""
         rows.append([f"`{rule.name}`", does.partition("\n")[0], rule.effect, rule.meaning])
-    return markdown(("rule", "when", "then", "told as"), rows)
+    return markdown(("rule", "when", "then", "message"), rows)
 
 
 def safety_limits() -> str:
     """Return the table of the limits of the safety gate."""
-    told = docstrings(SafetyParams)
-    rows = [[f"`{f.name}`", f"`{default_of(f)}`", told[f.name]] for f in fields(SafetyParams)]
+    meanings = docstrings(SafetyParams)
+    rows = [[f"`{f.name}`", f"`{default_of(f)}`", meanings[f.name]] for f in fields(SafetyParams)]
     return markdown(("limit", "default", "meaning"), rows)
 
 
@@ -389,11 +389,11 @@ def parameters(params: Any, names: tuple[str, ...]) -> str:
     rows = []
     for name in ("", *names):
         part = getattr(params, name) if name else params
-        told = docstrings(type(part))
+        meanings = docstrings(type(part))
         for f in fields(part):
             value = getattr(part, f.name)
             if not is_dataclass(value) and not isinstance(value, dict):
-                unit, _, meaning = told[f.name].replace("\n", " ").partition("]")
+                unit, _, meaning = meanings[f.name].replace("\n", " ").partition("]")
                 named = [
                     f"`{name}{'.' * bool(name)}{f.name}`",
                     f"`{value}`" if value in (None, True, False) else f"`{value:g}`",

@@ -46,8 +46,8 @@ def measure(name: str, seed: int) -> tuple[float, float, float, float]:
     while env.agents:
         actions = {agent: driver.act(seen) for agent, seen in observations.items()}
         observations, _, _, _, infos = env.step(actions)
-        told = [[info[key] for info in infos.values() if key in info] for key in MEASURES]
-        errors.append([np.mean(values) if values else np.nan for values in told])
+        samples = [[info[key] for info in infos.values() if key in info] for key in MEASURES]
+        errors.append([np.mean(values) if values else np.nan for values in samples])
     bound = posterior_bound(env.recorded_log("drive"), matched_params(env.scenario), skip=SETTLE)
     formation, tracking = np.nanmean(errors[round(SETTLE / DECISION) :], axis=0)
     return formation, tracking, bound.rmse, math.sqrt(2.0 / math.pi) * float(bound.pair_rms.mean())

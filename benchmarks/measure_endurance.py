@@ -37,7 +37,7 @@ NAP, STOOD = 0.002, 0.01
 """[s] Sleep of the watching processes; time between two wake-ups above which a core stalled."""
 NUMBERS = ("t", "missed", "late_decisions")
 """Fields of a row that are not the memory of a process."""
-TOLD = 2.0
+REPORT_DELAY = 2.0
 """[s] Longest delay of the report of a missed tick."""
 START = 120.0
 """[s] Additional time for the start of a drive."""
@@ -171,7 +171,10 @@ def _stood(
         "missed_at_s_beside_longest_ms": [
             [
                 round(t - begin, 1),
-                [max((ms for s, ms in core if 0.0 <= t - s < TOLD), default=0.0) for core in stood],
+                [
+                    max((ms for s, ms in core if 0.0 <= t - s < REPORT_DELAY), default=0.0)
+                    for core in stood
+                ],
             ]
             for t in misses
         ],

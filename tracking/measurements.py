@@ -21,7 +21,7 @@ N_VALUES = 16
 """Columns of `MeasurementBlock.values`."""
 N_MEASURED = 8
 """Number of leading columns that devices send; the tracker's orientation stage adds the rest."""
-ACCEL_NOISE, TOLD, UPRIGHT, GYRO_BIAS, GYRO_VAR = 7, 8, 9, 11, 14
+ACCEL_NOISE, AHRS_STATUS, UPRIGHT, GYRO_BIAS, GYRO_VAR = 7, 8, 9, 11, 14
 """Columns of a STATE event after orientation and acceleration, see `Kind`."""
 
 

@@ -90,7 +90,7 @@ def _reference_cost(n: int) -> float:
         began = time.perf_counter()
         air.step(before, after, _boxes())
         spent += time.perf_counter() - began if w >= settle else 0.0
-        air.told.clear()
+        air.events.clear()
     return 1e6 * spent / (windows * DT * hz)
 
 

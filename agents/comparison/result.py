@@ -106,8 +106,8 @@ class CompareResult:
 
         def rank(row: Row) -> tuple[bool, bool, float]:
             error = row.means["formation_error"]
-            told = row.contender.observation == "truth"
-            return row.trained_on is not None, told, np.inf if error is None else error.value
+            uses_truth = row.contender.observation == "truth"
+            return row.trained_on is not None, uses_truth, np.inf if error is None else error.value
 
         return min(self.of(scenario), key=rank)
 

@@ -24,7 +24,7 @@ from tracking.arrays import I64
 
 MOST_HISTORY = 64
 """[-] Maximum number of stacked observations, as in an environment."""
-TOLD_ROWS = 3
+MAX_ROWS = 3
 """[-] Maximum number of differences in a message."""
 
 
@@ -100,15 +100,15 @@ class Layout:
         Args:
             index: Table as `index`; the meaning of fields is not compared.
         """
-        told = []
+        rows = []
         for k in range(max(len(index), len(self.index))):
             here = _row(self.index[k]) if k < len(self.index) else "nothing"
             there = _row(index[k]) if k < len(index) else "nothing"
             if here != there:
-                told.append(f"expected {here}, got {there}")
-        if len(told) > TOLD_ROWS:
-            told[TOLD_ROWS:] = [f"{len(told) - TOLD_ROWS} more"]
-        return told
+                rows.append(f"expected {here}, got {there}")
+        if len(rows) > MAX_ROWS:
+            rows[MAX_ROWS:] = [f"{len(rows) - MAX_ROWS} more"]
+        return rows
 
     def refusal(self, other: Layout) -> str | None:
         """Return the reason why a policy of this layout cannot run on another; None if it can.

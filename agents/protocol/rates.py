@@ -46,15 +46,15 @@ def _measure(phy: str, n: int, rng: np.random.Generator) -> dict[str, Any]:
     assembled, law = group.t, round_rate(PHYS[phy], n)
     group.run(max(5.0 / law, 1.5))  # until clocks are estimated, tables full, IDs checked
     group.listen()
-    group.air.told.clear()
+    group.air.events.clear()
     group.run(max(6.0 / law, min(2.0, 100.0 / law)))
     requests = [h.start for h in group.listen() if h.frame.type is Type.REQUEST]
     requests = [t for k, t in enumerate(requests) if k == 0 or t - requests[k - 1] > 0.5 / law]
     hz = (len(requests) - 1) / (requests[-1] - requests[0])
     between = [
-        told
-        for told in group.air.told
-        if isinstance(told.event, RangeEvent) and requests[0] <= told.t < requests[-1]
+        output
+        for output in group.air.events
+        if isinstance(output.event, RangeEvent) and requests[0] <= output.t < requests[-1]
     ]
     pairs = n * (n - 1) / 2 * (len(requests) - 1)
     return {

@@ -36,7 +36,7 @@ def demo_report(result: DemoResult, missing: Sequence[str] = ()) -> str:
     page.raw(animation_markup(result.frames))
     page.heading("Formation error")
     page.table(
-        ["the cars are told", f"mean after {SETTLE:.0f} s [m]"],
+        ["information of the cars", f"mean after {SETTLE:.0f} s [m]"],
         [
             ["what the tracker estimates", metres(result.formation_error)],
             ["the truth", metres(result.formation_error_truth)],

@@ -78,10 +78,10 @@ class RllibConfig:
     @property
     def record(self) -> dict[str, Any]:
         """Configuration for JSON, with the file or name of the scenario."""
-        told = dict(self.arguments)
-        scenario = told.get("scenario")
+        arguments = dict(self.arguments)
+        scenario = arguments.get("scenario")
         if isinstance(scenario, Scenario):
-            told["scenario"] = scenario.name
+            arguments["scenario"] = scenario.name
         elif isinstance(scenario, Path):
-            told["scenario"] = str(scenario)
-        return asdict(replace(self, arguments=told))
+            arguments["scenario"] = str(scenario)
+        return asdict(replace(self, arguments=arguments))

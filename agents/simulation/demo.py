@@ -23,7 +23,7 @@ from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
 from tracking.log.folder import Log
 from tracking.params.short_repr import short_repr
 
-TOLD = ("estimate", "truth", "nothing")
+INFORMATION = ("estimate", "truth", "nothing")
 """Information about other cars in each drive of a demonstration."""
 CONTROLLER, TASK = "consensus", "ring"
 """Default controller and task."""
@@ -128,7 +128,8 @@ def demo(
         film: Called with a picture of the drive on estimates after every control step, uint8
             (height, width, 3), if there is no window; needs pygame.
         progress: Called with the share done, 0 to 1.
-        watch: Called after every control step with the frames so far and an element of `TOLD`.
+        watch: Called after every control step with the frames so far and an element of
+            `INFORMATION`.
 
     Raises:
         ConfigError: No such filter.
@@ -155,15 +156,15 @@ def demo(
                 f"got {proximity}"
             )
         proximity = trained.layout.proximity
-    for n, (told, mode) in enumerate(modes.items()):
+    for n, (information, mode) in enumerate(modes.items()):
 
         def tell(share: float, n: int = n) -> None:
             if progress is not None:
                 progress((n + share) / len(modes))
 
-        def show(frames: dict[str, Any], told: str = told) -> None:
+        def show(frames: dict[str, Any], information: str = information) -> None:
             if watch is not None:
-                watch(frames, told)
+                watch(frames, information)
 
         env = formation_v0.parallel_env(
             scenario=scenario,
@@ -173,25 +174,25 @@ def demo(
             history=history,
             proximity=proximity or 0,
             max_cycles=round(seconds / DECISION),
-            record=told == "estimate",
+            record=information == "estimate",
             filter=filter,
-            render_mode=render if told == "estimate" else None,
+            render_mode=render if information == "estimate" else None,
         )
         driver: Driver
         if trained is None:
             driver = controller_builder(controller)(env.fields)
         else:
             driver = trained.driver(Layout(mode, len(env.possible_agents), history, proximity or 0))
-        drives[told] = drive(
+        drives[information] = drive(
             env,
             driver,
             seed,
-            blind=told == "nothing",
+            blind=information == "nothing",
             progress=tell,
             watch=show,
             film=film,
         )
-        if told == "estimate":
+        if information == "estimate":
             name = env.scenario.name
             log = env.recorded_log(f"{name}-{seed}")
         env.close()
@@ -228,8 +229,11 @@ def _trained_for(policy: TrainedPolicy | None) -> tuple[str | None, str | None]:
 
 
 def _modes(policy: TrainedPolicy | None) -> dict[str, str]:
-    """Return the observation mode of each drive, by element of `TOLD`."""
-    modes = {told: "truth" if told == "truth" else "estimate" for told in TOLD}
+    """Return the observation mode of each drive, by element of `INFORMATION`."""
+    modes = {
+        information: "truth" if information == "truth" else "estimate"
+        for information in INFORMATION
+    }
     if policy is not None and policy.layout.observation not in modes.values():
         # The observations of this policy are measurements, without a true counterpart.
         del modes["truth"]

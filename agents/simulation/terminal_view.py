@@ -125,12 +125,12 @@ class LiveRoom:
         size, plain = self._console.size, "utf" not in self._console.encoding.lower()
         room = draw_room(frames, k, width=size.width - 4, height=size.height - 7, plain=plain)
         error = frames["tracking"][k]
-        told = f"{frames['t'][k]:5.1f} s, formation error {frames['formation'][k]:.2f} m"
+        text = f"{frames['t'][k]:5.1f} s, formation error {frames['formation'][k]:.2f} m"
         if error is not None:
-            told += f", tracking error {error:.2f} m"
+            text += f", tracking error {error:.2f} m"
         panel = Panel(room, title=title, expand=False, padding=0, safe_box=plain)
         key = "o: where the first car believes another, +: where it wants it"
-        self._live.update(Group(panel, Text(f"{told}\n{key}")), refresh=True)
+        self._live.update(Group(panel, Text(f"{text}\n{key}")), refresh=True)
 
     def replay(self, frames: dict[str, Any], title: str, until: Callable[[], bool]) -> None:
         """Show a drive repeatedly in real time until `until` returns True."""

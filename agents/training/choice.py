@@ -66,8 +66,8 @@ def choose(config: TrainConfig, runs: Sequence[Path]) -> Choice:
                 continue
             legs.add(row["leg"])
             restore_weights(policy, tensors)
-            told = {"seed": run.config().seed, "leg": row["leg"], "frames": row["frames"]}
-            rows.append(told | evaluation.run(policy))
+            entry = {"seed": run.config().seed, "leg": row["leg"], "frames": row["frames"]}
+            rows.append(entry | evaluation.run(policy))
             found.append(Choice(run=path, weights=name, measured=rows[-1], rows=rows))
     evaluation.close()
     return max(found, key=lambda choice: float(choice.measured["return"]))

@@ -93,8 +93,8 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
         seen, rewards, dones, infos = zip(
             *(jobs[k].result() for k in range(len(self.parts))), strict=True
         )
-        told = list(chain.from_iterable(infos))
-        return np.concatenate(seen), np.concatenate(rewards), np.concatenate(dones), told
+        all_infos = list(chain.from_iterable(infos))
+        return np.concatenate(seen), np.concatenate(rewards), np.concatenate(dones), all_infos
 
     def _step(self, k: int) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
         """Run one control step in part k."""
@@ -133,6 +133,6 @@ class _SeatView:
         if not self._n_truth:
             return seen
         truth = np.zeros((*seen.shape[:-1], self._n_truth), np.float32)
-        told = observations[..., self._size :]
-        truth[..., : told.shape[-1]] = told
+        given = observations[..., self._size :]
+        truth[..., : given.shape[-1]] = given
         return np.concatenate([seen, truth], axis=-1)

@@ -62,8 +62,8 @@ def train_policy(
     def tell(k: int, share: float, row: dict[str, Any] | None) -> None:
         done[k] = share
         if progress is not None:
-            told = None if row is None else {"seed": seeds[k], **row}
-            progress(sum(done) / len(done), told)
+            record = None if row is None else {"seed": seeds[k], **row}
+            progress(sum(done) / len(done), record)
 
     configs = [config.of_run(k) for k in range(config.runs)]
     seeds = [c.seed for c in configs]

@@ -60,19 +60,19 @@ def train_side_by_side(
                 assert isinstance(connection, Connection)
                 k = waiting[connection]
                 try:
-                    told = connection.recv()
+                    message = connection.recv()
                 except EOFError as error:
                     raise UsageError(
                         f"{folders[k]}: its process was ended from outside, perhaps for want of "
                         "memory; go on with --resume, or begin with fewer --runs"
                     ) from error
-                if isinstance(told, Exception):
-                    raise told
-                if isinstance(told, TrainResult):
-                    results[k] = told
+                if isinstance(message, Exception):
+                    raise message
+                if isinstance(message, TrainResult):
+                    results[k] = message
                     del waiting[connection]
                 else:
-                    progress(k, *told)
+                    progress(k, *message)
     finally:
         for process in processes:
             process.terminate()

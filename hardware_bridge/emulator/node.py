@@ -150,10 +150,10 @@ class EmulatedNode:
             named = reading._replace(source=source)
             if isinstance(named, RangeReading):
                 named = named._replace(to=wire.name_of(int(named.to)))
-            told: list[Reading] = [named]
+            readings: list[Reading] = [named]
             if wire.always_voltage and not isinstance(named, StatusReading):
-                told.append(StatusReading(source, self.params.voltage))
-            frame = self._encoders[port].encode(told)
+                readings.append(StatusReading(source, self.params.voltage))
+            frame = self._encoders[port].encode(readings)
             if frame:
                 sent[port].append(frame)
             return

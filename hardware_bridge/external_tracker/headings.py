@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hardware_bridge.external_tracker.pending import ToldHeading
+from hardware_bridge.external_tracker.pending import HeadingReport
 from tracking.arrays import F64, Bool
 
 SMOOTH = 0.1
@@ -31,9 +31,9 @@ class Headings:
         """Discard the reports of a node."""
         self.t[node], self._rate[node] = -np.inf, np.nan
 
-    def take(self, told: list[tuple[int, ToldHeading]]) -> None:
+    def take(self, reports: list[tuple[int, HeadingReport]]) -> None:
         """Process reports; one older than the last of its node is ignored."""
-        for node, heading in told:
+        for node, heading in reports:
             dt = heading.t - self.t[node]
             if dt < 0.0:
                 continue

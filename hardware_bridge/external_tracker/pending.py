@@ -13,7 +13,7 @@ from tracking.params.short_repr import short_repr
 
 
 @dataclass(frozen=True, slots=True)
-class ToldPlace:
+class PositionReport:
     """Reported position of a pair or a node; world frame."""
 
     __repr__ = short_repr
@@ -31,7 +31,7 @@ class ToldPlace:
 
 
 @dataclass(frozen=True, slots=True)
-class ToldHeading:
+class HeadingReport:
     """Reported orientation of a node."""
 
     t: float
@@ -39,14 +39,14 @@ class ToldHeading:
     q_wb: tuple[float, float, float, float]
 
 
-class Told:
+class PendingReports:
     """Lists of reports in order of arrival."""
 
     def __init__(self) -> None:
-        self.pairs: list[tuple[int, int, ToldPlace]] = []
+        self.pairs: list[tuple[int, int, PositionReport]] = []
         """Indices of the nodes, i < j, and the report."""
-        self.nodes: list[tuple[int, ToldPlace]] = []
-        self.headings: list[tuple[int, ToldHeading]] = []
+        self.nodes: list[tuple[int, PositionReport]] = []
+        self.headings: list[tuple[int, HeadingReport]] = []
 
     def add_pair(self, t: float, nodes: tuple[int, ...], reading: PairReading) -> None:
         """Add a position of a pair; nodes by their indices, in the order of the reading."""
@@ -56,16 +56,16 @@ class Told:
             i, j, pos = j, i, _opposite(pos)
             vel = None if vel is None else _opposite(vel)
         cov = _square(reading.cov)
-        self.pairs.append((i, j, ToldPlace(t, pos, vel, cov, reading.status, reading.nlos)))
+        self.pairs.append((i, j, PositionReport(t, pos, vel, cov, reading.status, reading.nlos)))
 
     def add_pose(self, t: float, node: int, reading: PoseReading) -> None:
         """Add position and orientation of a node."""
         if reading.pos is not None:
             cov = _square(reading.cov)
-            place = ToldPlace(t, reading.pos, reading.vel, cov, Status.OK, 0.0)
+            place = PositionReport(t, reading.pos, reading.vel, cov, Status.OK, 0.0)
             self.nodes.append((node, place))
         if reading.q_wb is not None:
-            self.headings.append((node, ToldHeading(t, reading.q_wb)))
+            self.headings.append((node, HeadingReport(t, reading.q_wb)))
 
     def clear(self) -> None:
         """Discard all reports."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from hardware_bridge.external_tracker.headings import Headings
 from hardware_bridge.external_tracker.params import ReadyParams
-from hardware_bridge.external_tracker.pending import Told
+from hardware_bridge.external_tracker.pending import PendingReports
 from hardware_bridge.external_tracker.tracks import Tracks
 from relpos_env.interface._view_kernels import forget_all, note_ranges
 from relpos_env.interface.views import AgentView, bind_view, make_view
@@ -36,7 +36,7 @@ class ReadyPerception:
         self,
         constellation: Constellation,
         params: ReadyParams,
-        told: Told,
+        pending: PendingReports,
         block: MeasurementBlock,
         powered: Bool,
         n_beams: int = 0,
@@ -46,13 +46,13 @@ class ReadyPerception:
         Args:
             constellation: The nodes; the first ones are on the cars, in the cars' order.
             params: Parameters of the external tracker.
-            told: Reports, filled by the caller before every step and emptied by it.
+            pending: Reports, filled by the caller before every step and emptied by it.
             block: Measurements, of which departures and ranges are used.
             powered: True for present cars, (1, car); written by the caller before every step.
             n_beams: Number of distance sensors of each car.
         """
         group, n_cars = constellation, powered.shape[1]
-        self.constellation, self._params, self._told = group, params, told
+        self.constellation, self._params, self._pending = group, params, pending
         self._i, self._j = group.pairs.T
         moves = ~group.is_static
         ends = moves[self._i].astype(np.float64) + moves[self._j]
@@ -77,7 +77,7 @@ class ReadyPerception:
         self._pairs.forget(np.arange(self.constellation.n_pairs))
         for node in everyone.tolist():
             self._headings.forget(node)
-        self._told.clear()
+        self._pending.clear()
         forget_all(self.view, env)
 
     @property
@@ -107,10 +107,10 @@ class ReadyPerception:
         now = float(self.view.now[0])
         self._let_go()
         index = self.constellation.pair_index
-        self._pairs.take([(int(index[i, j]), place) for i, j, place in self._told.pairs])
-        self._nodes.take(self._told.nodes)
-        self._headings.take(self._told.headings)
-        self._told.clear()
+        self._pairs.take([(int(index[i, j]), place) for i, j, place in self._pending.pairs])
+        self._nodes.take(self._pending.nodes)
+        self._headings.take(self._pending.headings)
+        self._pending.clear()
         self._believe(now)
         self._see()
         self._note()
@@ -143,8 +143,8 @@ class ReadyPerception:
         other = by_nodes > pairs.t
         x = np.where(other[:, None], place[j] - place[i], x)
         P = np.where(other[:, None, None], place_cov[i] + place_cov[j], P)  # noqa: N806
-        told = np.where(other, by_nodes, pairs.t)
-        known = np.isfinite(told)
+        t_report = np.where(other, by_nodes, pairs.t)
+        known = np.isfinite(t_report)
         if self.constellation.dimensions == 2:
             x[:, [2, 5]] = 0.0
             P[:, [2, 5], :] = P[:, :, [2, 5]] = 0.0
@@ -152,17 +152,17 @@ class ReadyPerception:
         e.pos_ij_w[0] = np.where(known[:, None], x[:, :3], 0.0)
         e.vel_ij_w[0] = np.where(known[:, None], x[:, 3:], 0.0)
         e.cov[0] = np.where(known[:, None, None], P, 0.0)
-        e.age[0] = np.where(known, np.maximum(now - told, 0.0), 0.0)
+        e.age[0] = np.where(known, np.maximum(now - t_report, 0.0), 0.0)
         e.nlos_prob[0] = np.where(other, 0.0, pairs.nlos)
         e.status[0] = self._status(np.where(other, Status.OK, pairs.status), known)
         e.q_wb[0] = self._headings.q_wb
         e.has_orientation[0] = self._headings.known(now, self._params.stale)
         self._turns[0] = self._headings.turns(now)
 
-    def _status(self, told: I64, known: Bool) -> I64:
+    def _status(self, reported: I64, known: Bool) -> I64:
         """Return the reported status, LOST if too old, ABSENT if unknown, (pair)."""
-        old = (self.estimate.age[0] > self._params.stale) & (told >= Status.OK)
-        status = np.where(old, Status.LOST, told)
+        old = (self.estimate.age[0] > self._params.stale) & (reported >= Status.OK)
+        status = np.where(old, Status.LOST, reported)
         return np.where(known, status, Status.ABSENT)
 
     def _note_distances(self) -> None:
@@ -170,10 +170,10 @@ class ReadyPerception:
         e, view, n = self.estimate, self.view, self.view.heard.shape[1]
         cars = (self._i < n) & (self._j < n) & (e.status[0] != Status.ABSENT)
         i, j = self._i[cars], self._j[cars]
-        told = e.t[0] - e.age[0, cars]
+        t_report = e.t[0] - e.age[0, cars]
         length = np.linalg.norm(e.pos_ij_w[0, cars], axis=1)
-        newer = (told > view.heard[0, i, j]) & (e.age[0, cars] <= self._params.stale)
+        newer = (t_report > view.heard[0, i, j]) & (e.age[0, cars] <= self._params.stale)
         for a, b in ((i, j), (j, i)):
-            view.heard[0, a[newer], b[newer]] = told[newer]
+            view.heard[0, a[newer], b[newer]] = t_report[newer]
             view.distance[0, a[newer], b[newer]] = length[newer]
             view.gap[0, a[newer], b[newer]] = 0.0

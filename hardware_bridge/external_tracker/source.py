@@ -6,7 +6,7 @@ from collections import Counter
 
 from hardware_bridge.clocks import DeviceTime
 from hardware_bridge.external_tracker.frozen_positions import StuckPlaces
-from hardware_bridge.external_tracker.pending import Told
+from hardware_bridge.external_tracker.pending import PendingReports
 from hardware_bridge.ingest.naming import Naming
 from hardware_bridge.ingest.stream import Stream
 from hardware_bridge.plausibility import Plausibility
@@ -44,7 +44,7 @@ class OtherTracker:
         self._naming, self._plausibility = naming, plausibility
         self._refused, self._notices = refused, notices
         self._stuck = StuckPlaces()
-        self.told = Told()
+        self.pending = PendingReports()
         """Accepted reports that were not processed yet."""
         self.driving: frozenset[int] = frozenset()
         """Indices of driving nodes, by wheels or permitted commands; written by the caller."""
@@ -66,9 +66,9 @@ class OtherTracker:
             return ()
         t = (t_ns - self._start_ns) * NS
         if isinstance(reading, PoseReading):
-            self.told.add_pose(t, nodes[0], reading)
+            self.pending.add_pose(t, nodes[0], reading)
             return nodes
-        self.told.add_pair(t, nodes, reading)
+        self.pending.add_pair(t, nodes, reading)
         return () if reading.status in (Status.LOST, Status.ABSENT) else nodes
 
     def _believes(

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hardware_bridge.external_tracker.pending import ToldPlace
+from hardware_bridge.external_tracker.pending import PositionReport
 from tracking.arrays import F64, I64
 from tracking.estimate import Status
 
@@ -64,12 +64,12 @@ class Tracks:
         self.status[tracks] = Status.ABSENT
         self.nlos[tracks] = 0.0
 
-    def take(self, told: list[tuple[int, ToldPlace]]) -> None:
+    def take(self, reports: list[tuple[int, PositionReport]]) -> None:
         """Process reports, with the indices of their tracks, in the order of arrival."""
-        waiting = told
+        waiting = reports
         while waiting:
             # Each round takes one report per track and processes all tracks at once.
-            now: dict[int, ToldPlace] = {}
+            now: dict[int, PositionReport] = {}
             later = []
             for k, place in waiting:
                 if k in now:
@@ -84,28 +84,28 @@ class Tracks:
         dt = np.where(np.isfinite(self.t), now - self.t, 0.0)
         return self._carried(np.arange(len(self.t)), np.maximum(dt, 0.0))
 
-    def _take_round(self, told: dict[int, ToldPlace]) -> None:
-        if not told:
+    def _take_round(self, reports: dict[int, PositionReport]) -> None:
+        if not reports:
             return
-        k = np.fromiter(told, dtype=np.int64)
-        t = np.array([p.t for p in told.values()])
-        z = np.array([p.pos for p in told.values()])
+        k = np.fromiter(reports, dtype=np.int64)
+        t = np.array([p.t for p in reports.values()])
+        z = np.array([p.pos for p in reports.values()])
         R = np.array(  # noqa: N806
-            [self._var if p.cov is None else p.cov[:3, :3] for p in told.values()]
+            [self._var if p.cov is None else p.cov[:3, :3] for p in reports.values()]
         )
         new = ~np.isfinite(self.t[k])
-        whole = np.array([p.vel is not None for p in told.values()])
+        whole = np.array([p.vel is not None for p in reports.values()])
         self._begin(k[new & ~whole], z[new & ~whole], R[new & ~whole])
         follows = ~new & ~whole
         self._update(k[follows], t[follows] - self.t[k[follows]], z[follows], R[follows])
-        for track, place in told.items():
+        for track, place in reports.items():
             if place.vel is not None:
                 self.x[track] = (*place.pos, *place.vel)
                 self.P[track] = self._whole_cov(place)
             self.status[track], self.nlos[track] = place.status, place.nlos
         self.t[k] = t
 
-    def _whole_cov(self, place: ToldPlace) -> F64:
+    def _whole_cov(self, place: PositionReport) -> F64:
         if place.cov is not None and len(place.cov) == 6:
             return place.cov
         P = np.zeros((6, 6))  # noqa: N806

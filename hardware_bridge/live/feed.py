@@ -54,7 +54,7 @@ class LiveFeed:
             links.watch(supervisor.fileno())
         self._due = now_ns()
         self._spoken = 0
-        self._told_of_disk = False
+        self._reported_full_disk = False
         self.report: Report | None = None
         """Latest report of the gate."""
         self.notices: list[tuple[int, str]] = []
@@ -162,6 +162,6 @@ class LiveFeed:
             self.note(t_ns, text)
         intake.notices.clear()
         lost = self._recorder.lost if self._recorder is not None else None
-        if lost is not None and not self._told_of_disk:
-            self._told_of_disk = True
+        if lost is not None and not self._reported_full_disk:
+            self._reported_full_disk = True
             self.notices.append((self._now_ns(), f"recording fails: {lost}"))

@@ -151,10 +151,10 @@ class LiveSwarm:
     def _make_perception(self) -> Perception | ReadyPerception:
         tracker, group = self.config.tracker, self.group
         if tracker.source == "positions":
-            told = self.intake.other.told
+            pending = self.intake.other.pending
             n_beams = self.config.task.proximity
             return ReadyPerception(
-                group, tracker.positions, told, self._block, self._powered, n_beams
+                group, tracker.positions, pending, self._block, self._powered, n_beams
             )
         believed = FOR_POLICIES
         if tracker.accuracy is not None:

@@ -51,8 +51,8 @@ class _Pretend:
             swarm.intake.heard_ns[k] = swarm.intake.sensed_ns[k] = round(t * 1e9)
             events.add(t, Kind.MAG, k, (20.0, 0.0, -40.0))
             events.add(t, Kind.IMU, k, (0.0, 0.0, 0.1, 0.3 * math.sin(t), 0.0, GRAVITY))
-            told = PoseReading(UNNAMED, "", pos=tuple(pos[k]), q_wb=(1.0, 0.0, 0.0, 0.0))
-            swarm.intake.other.told.add_pose(t, k, told)
+            pose = PoseReading(UNNAMED, "", pos=tuple(pos[k]), q_wb=(1.0, 0.0, 0.0, 0.0))
+            swarm.intake.other.pending.add_pose(t, k, pose)
         for i, j in group.pairs.tolist():
             distance = float(np.linalg.norm(pos[j] - pos[i]))
             events.add_range(t, (i, j), (antenna[i], antenna[j]), (distance, -80.0, -82.0))

@@ -76,7 +76,7 @@ class Recorder:
         self._failing = False
         self._closing = False
         # Used by the writing thread only: losses not yet in the file, time of the next attempt.
-        self._untold: _Loss | None = None
+        self._unwritten: _Loss | None = None
         self._retry_at = clock()
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
@@ -188,9 +188,9 @@ class Recorder:
         batch = list(queue)
         if closing and loss is not None:
             batch.append(loss)
-        if self._untold is not None and (batch or closing):
-            batch.insert(0, self._untold)
-            self._untold = None
+        if self._unwritten is not None and (batch or closing):
+            batch.insert(0, self._unwritten)
+            self._unwritten = None
         if batch:
             self._handle(batch, closing)
         self._note_sync()
@@ -205,8 +205,8 @@ class Recorder:
             if error is not None:
                 self._retry_at = now + RETRY_S
         for item in batch[n:]:
-            self._untold = _Loss.of(
-                self._untold, item.n if isinstance(item, _Loss) else 1, item.t_ns
+            self._unwritten = _Loss.of(
+                self._unwritten, item.n if isinstance(item, _Loss) else 1, item.t_ns
             )
         n_written = sum(isinstance(item, Record) for item in batch[:n])
         n_dropped = sum(isinstance(item, Record) for item in batch[n:])

@@ -17,7 +17,7 @@ from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture
 from hardware_bridge.safety.recent import Recent, at_rest
 from hardware_bridge.safety.rules import RULES
-from hardware_bridge.safety.telemetry import Told, nothing_told
+from hardware_bridge.safety.telemetry import TelemetryState, no_telemetry
 from tracking.arrays import F64, I64, Bool
 from tracking.params.short_repr import short_repr
 
@@ -132,7 +132,7 @@ class Gate:
         word: F64,
         heard: F64,
         linked: Bool,
-        told: Told | None = None,
+        telemetry: TelemetryState | None = None,
     ) -> GateOutput:
         """Return the permitted commands.
 
@@ -142,10 +142,10 @@ class Gate:
             word: Time of the deciding process's last heartbeat, (env) [s].
             heard: Time of the last message of each car's node, (env, car) [s].
             linked: True if the car's port is open, (env, car).
-            told: Telemetry of the cars' controllers; None without telemetry.
+            telemetry: Telemetry of the cars' controllers; None without telemetry.
         """
         p = self.params
-        told = nothing_told(heard.shape, p) if told is None else told
+        telemetry = no_telemetry(heard.shape, p) if telemetry is None else telemetry
         forward, backward = np.full((2, *heard.shape), p.max_speed)
         left, right = np.full((2, *heard.shape), p.max_steering)
         requested = np.nan_to_num(
@@ -159,7 +159,7 @@ class Gate:
                 verdict = rule.check(
                     Moment(
                         picture, now, word, heard, linked,
-                        self.armed, self._recent, told, self._slow[k],
+                        self.armed, self._recent, telemetry, self._slow[k],
                     ), p
                 )  # fmt: skip
                 on, back = (np.where(cap >= 0.0, cap, 0.0) for cap in verdict[:2])

@@ -8,7 +8,7 @@ import numpy as np
 
 from hardware_bridge.safety.picture import Picture
 from hardware_bridge.safety.recent import Recent
-from hardware_bridge.safety.telemetry import Told
+from hardware_bridge.safety.telemetry import TelemetryState
 from tracking.arrays import F64, Bool
 
 FREE = np.inf
@@ -30,7 +30,7 @@ class Moment(NamedTuple):
     """True for armed cars, which the gate limits by its rules, (env, car)."""
     recent: Recent
     """Bounds of the cars' motion given the latest commands."""
-    told: Told
+    telemetry: TelemetryState
     """Telemetry of the cars' controllers."""
     was_slow: Bool
     """True if this rule's last verdict capped or stopped the car, (env, car): for hysteresis."""

@@ -59,23 +59,23 @@ def link(m: Moment, p: SafetyParams) -> Verdict:
 
 def fault(m: Moment, p: SafetyParams) -> Verdict:
     """The car's controller reports a fault."""
-    return _held(m.told.fault)
+    return _held(m.telemetry.fault)
 
 
 def runaway(m: Moment, p: SafetyParams) -> Verdict:
     """The car's controller reports a speed that no command explains."""
-    return _held(m.told.over_for >= p.runaway_time)
+    return _held(m.telemetry.over_for >= p.runaway_time)
 
 
 def deaf(m: Moment, p: SafetyParams) -> Verdict:
     """The car acknowledges no commands, reports no speed, or is at rest despite commands."""
-    return _held((m.told.deaf_for >= p.answer_time) | (m.told.idle_for >= p.idle_time))
+    return _held((m.telemetry.deaf_for >= p.answer_time) | (m.telemetry.idle_for >= p.idle_time))
 
 
 def battery(m: Moment, p: SafetyParams) -> Verdict:
     """The car's battery is nearly empty."""
     limit = np.where(m.was_slow, p.cell_slow + RECOVERED, p.cell_slow)
-    low, empty = m.told.cell < limit, m.told.cell < p.cell_stop
+    low, empty = m.telemetry.cell < limit, m.telemetry.cell < p.cell_stop
     return _capped(np.where(empty, 0.0, np.where(low, p.slow, FREE)), empty)
 
 
@@ -146,7 +146,7 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
     d = np.maximum(np.hypot(q.pos[..., 0], q.pos[..., 1]), 1e-9)
     towards = q.pos / d[..., None]
     room = d - p.separation - p.confidence * q.sigma
-    time = p.reaction + age_of(m) + np.where(m.linked, 0.0, m.told.watchdog)
+    time = p.reaction + age_of(m) + np.where(m.linked, 0.0, m.telemetry.watchdog)
     angle, _ = bearing(ahead[:, None, :], -towards)
     sure = (q.oriented == 1.0)[:, None, :]
     held = m.armed[:, None, :]
@@ -155,8 +155,8 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
     free = np.where(held, 0.0, np.maximum(seen, np.abs(q.speed)[:, None, :]))
     used = stopping_way(free, time[:, None, :], p.braking)
     swing = np.arctan(REAR / p.turning_radius)
-    for sign, told in ((1.0, recent.forward), (-1.0, recent.backward)):
-        way = stopping_way(np.maximum(sign * q.speed, told), time, p.braking)[:, None, :]
+    for sign, bound in ((1.0, recent.forward), (-1.0, recent.backward)):
+        way = stopping_way(np.maximum(sign * q.speed, bound), time, p.braking)[:, None, :]
         off = angle if sign > 0.0 else np.pi - angle
         turned = np.where(sure, np.maximum(off - swing, 0.0), 0.0)
         used = np.maximum(used, gain(way, turned, p.turning_radius))

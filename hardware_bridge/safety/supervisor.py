@@ -73,7 +73,7 @@ class Supervisor:
         self._ended = ""
         """Reason for the end of the run, for all cars."""
         self._broken: dict[int, str] = {}
-        self._told: dict[int, tuple[float, bool]] = {}
+        self._last_command: dict[int, tuple[float, bool]] = {}
         """Time of each car's last command, and whether it was one to move."""
         self._taken: dict[int, float] = {}
         """Time at which each car's port last took its command, or was lost [s]."""
@@ -151,8 +151,12 @@ class Supervisor:
         for slot in self._drivers:
             self._taken[slot] = self._taken.get(slot, now) if slot in linked else now
         self._now[0] = now
-        told = self._telemetry.told(now, self._gate.recent, self._gate.armed[0], self._linked[0])
-        out = self._gate.step(self._picture, self._now, self._word, self._heard, self._linked, told)
+        telemetry = self._telemetry.state(
+            now, self._gate.recent, self._gate.armed[0], self._linked[0]
+        )
+        out = self._gate.step(
+            self._picture, self._now, self._word, self._heard, self._linked, telemetry
+        )
         self._output = out
         said = {
             slot: self._bytes(slot, out) if self._is_due(slot, now, out) else b""
@@ -170,11 +174,11 @@ class Supervisor:
 
     def _is_due(self, slot: int, now: float, out: GateOutput) -> bool:
         """Return whether a command is due, and note it; the first stop command always is."""
-        t, moved = self._told.get(slot, (-np.inf, True))
+        t, moved = self._last_command.get(slot, (-np.inf, True))
         moves = bool(out.moving[0, slot])
         due = now - t >= self._drivers[slot].gap - HALF_A_TICK or (moved and not moves)
         if due:
-            self._told[slot] = now, moves
+            self._last_command[slot] = now, moves
         return due
 
     def _bytes(self, slot: int, out: GateOutput) -> bytes:
@@ -203,7 +207,7 @@ class Supervisor:
                 self._taken[slot] = now
                 self._telemetry.sent(slot, self._drivers[slot].sequence - 1, now)
             else:
-                self._told.pop(slot, None)  # not sent
+                self._last_command.pop(slot, None)  # not sent
         t = float(self._picture.t[0])
         if t > self._decided:
             self._decided, self._lag = t, now - t

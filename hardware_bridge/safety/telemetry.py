@@ -24,7 +24,7 @@ COMMANDS = 1000
 """[-] Number of unanswered commands kept per car; more than are sent within `answer_time`."""
 
 
-class Told(NamedTuple):
+class TelemetryState(NamedTuple):
     """Telemetry of every car, arrays over (env, car); without effect where none is received."""
 
     over_for: F64
@@ -42,10 +42,10 @@ class Told(NamedTuple):
     """[s] Time without commands after which the car stops by itself."""
 
 
-def nothing_told(shape: tuple[int, ...], params: SafetyParams) -> Told:
+def no_telemetry(shape: tuple[int, ...], params: SafetyParams) -> TelemetryState:
     """Return the values for cars without telemetry."""
     zero = np.zeros(shape)
-    return Told(
+    return TelemetryState(
         zero, zero, zero, np.zeros(shape, dtype=bool), np.full(shape, np.inf),
         np.full(shape, params.deadman),
     )  # fmt: skip
@@ -112,7 +112,7 @@ class Telemetry:
                     if voltage is not None:
                         self._note_voltage(slot, voltage, now)
 
-    def told(self, now: float, recent: Recent, moving: Bool, linked: Bool) -> Told:
+    def state(self, now: float, recent: Recent, moving: Bool, linked: Bool) -> TelemetryState:
         """Return the input of the rules, of one environment.
 
         Args:
@@ -132,7 +132,7 @@ class Telemetry:
         self._answered = np.where(linked & np.isfinite(self._answered), self._answered, now)
         known = np.isfinite(self._volts) & (self._cells > 0.0)
         cell = np.where(known, self._volts / np.maximum(self._cells, 1.0), np.inf)
-        return Told(
+        return TelemetryState(
             np.maximum(now - self._over_since, 0.0)[None],
             np.maximum(now - self._idle_since, 0.0)[None],
             np.maximum(

@@ -191,7 +191,7 @@ class _Watch:
             try:
                 message = unpack(data, self._n_cars)
             except ValueError as error:
-                self._say([Notice(f"supervisor: it was told what it cannot read, {error}")])
+                self._say([Notice(f"supervisor: it received an unreadable message, {error}")])
                 continue
             decided |= isinstance(message, Decision | Order)
             self._say(self._supervisor.take(message))

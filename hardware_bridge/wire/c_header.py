@@ -72,10 +72,10 @@ def _struct(message: Message) -> str:
 
 def _member(field: Field) -> str:
     many = f"[{field.n}]" if field.n > 1 else ""
-    told = field.meaning
+    meaning = field.meaning
     if field.steps > 1:
-        told = f"[1/{field.steps} {field.unit}] {told}".replace(" ]", "]")
-    return f"    {_c_type(field)} {field.name}{many}; /* {told} */"
+        meaning = f"[1/{field.steps} {field.unit}] {meaning}".replace(" ]", "]")
+    return f"    {_c_type(field)} {field.name}{many}; /* {meaning} */"
 
 
 def _places(message: Message) -> Iterator[tuple[Field, str, int]]:

@@ -60,11 +60,11 @@ def truth_of_each(state: WorldState) -> F64:
     seen = s[:, (np.arange(n)[:, None] + np.arange(n)) % n]
     own = s[:, :, None]
     c, sn = own[..., 3], own[..., 4]
-    told = seen.copy()
+    relative = seen.copy()
     offset = seen[..., 1:3] - own[..., 1:3]
     for k, vector in ((1, offset), (3, seen[..., 3:5]), (5, seen[..., 5:7])):
         x, y = vector[..., 0], vector[..., 1]
-        told[..., k], told[..., k + 1] = c * x + sn * y, c * y - sn * x
-    told[:, :, 0, 1:3] = s[..., 1:3]
-    truth: F64 = (told * seen[..., :1] * own[..., :1]).reshape(n_envs, n, -1)
+        relative[..., k], relative[..., k + 1] = c * x + sn * y, c * y - sn * x
+    relative[:, :, 0, 1:3] = s[..., 1:3]
+    truth: F64 = (relative * seen[..., :1] * own[..., :1]).reshape(n_envs, n, -1)
     return truth

@@ -11,7 +11,7 @@ from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation
 from relpos_env.tasks.options import half_room, not_negative, positive
 from tracking.arrays import F64
 
-TOLD = ("all", "leader")
+INFORMED = ("all", "leader")
 
 
 def follow(
@@ -24,7 +24,7 @@ def follow(
     speed: float = 0.6,
     path: str | Sequence[Sequence[float]] | F64 = "loop",
     closed: bool = True,
-    told: str = "all",
+    informed: str = "all",
     lookahead: float = 0.3,
 ) -> MovingFormation:
     """Build a formation in a frame that moves and turns with the course of a leader.
@@ -42,14 +42,14 @@ def follow(
         speed: Speed of the leader [m/s].
         path: Course of the leader, one of `CURVES`, or points [m] with rounded corners.
         closed: True if a course of points is a closed loop.
-        told: Cars that receive the reference velocity: `all`, or the `leader` alone.
+        informed: Cars that receive the reference velocity: `all`, or the `leader` alone.
         lookahead: Lead time of the reference velocity [s].
 
     Raises:
         EnvError: An option is out of range, or the formation does not fit in the room.
     """
-    if told not in TOLD:
-        raise EnvError(f"told: expected one of {', '.join(TOLD)}, got {told!r}")
+    if informed not in INFORMED:
+        raise EnvError(f"informed: expected one of {', '.join(INFORMED)}, got {informed!r}")
     formation = Formation(shape, n_cars, spacing, led=True)
     half = half_room(room, MARGIN)
     # The followers may take a little less than half of the room, since the leader has to turn.
@@ -60,4 +60,6 @@ def follow(
         turning=True,
         lookahead=not_negative("lookahead", lookahead),
     )
-    return MovingFormation(n_cars, n_envs, formation, motion, led=True, all_told=told == "all")
+    return MovingFormation(
+        n_cars, n_envs, formation, motion, led=True, all_informed=informed == "all"
+    )

@@ -74,7 +74,7 @@ class MovingFormation(Task):
         motion: Motion,
         *,
         led: bool = False,
-        all_told: bool = True,
+        all_informed: bool = True,
     ) -> None:
         """Combine a formation and a motion.
 
@@ -84,7 +84,7 @@ class MovingFormation(Task):
             formation: Slots in the frame.
             motion: Motion of the frame.
             led: True if the first present car has the first slot.
-            all_told: True if all cars receive the reference velocity; else the first present one.
+            all_informed: True if all cars receive the reference velocity; else only the first.
         """
         self._stand, self._ways = motion.stand, None
         terms: tuple[str, ...]
@@ -96,7 +96,7 @@ class MovingFormation(Task):
             terms = ("formation", "velocity", *COMMON_TERMS, *(["time"] if ends else []))
         super().__init__(n_cars, n_envs, terms)
         self._formation, self._motion = formation, motion
-        self._led, self._all_told = led, all_told
+        self._led, self._all_informed = led, all_informed
         self._frame, self._places = np.zeros((n_envs, 4)), np.zeros((n_envs, n_cars, 3))
         curve = motion.curve
         self._constants = (
@@ -207,4 +207,4 @@ class MovingFormation(Task):
             places = places[assign(own, places)]
         self._places[env] = 0.0
         self._places[env, cars, :2] = places
-        self._places[env, cars if self._all_told else cars[:1], 2] = 1.0
+        self._places[env, cars if self._all_informed else cars[:1], 2] = 1.0

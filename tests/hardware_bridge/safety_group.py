@@ -8,7 +8,7 @@ from hardware_bridge.safety.params import Fence, SafetyParams
 from hardware_bridge.safety.picture import Picture, blank_picture
 from hardware_bridge.safety.recent import at_rest
 from hardware_bridge.safety.rules import RULES
-from hardware_bridge.safety.telemetry import nothing_told
+from hardware_bridge.safety.telemetry import no_telemetry
 from tracking.estimate import Status
 
 TICK = 0.01
@@ -42,7 +42,7 @@ def check(name, q, params=None, *, now=0.0, word=0.0, heard=0.0, was_slow=False,
         "linked": np.ones(shape, dtype=bool),
         "armed": np.ones(shape, dtype=bool),
         "recent": at_rest(shape),
-        "told": nothing_told(shape, params or SafetyParams()),
+        "telemetry": no_telemetry(shape, params or SafetyParams()),
         **other,
     }
     moment = Moment(

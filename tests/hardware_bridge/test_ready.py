@@ -8,7 +8,7 @@ import pytest
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.external_tracker.headings import FARTHEST, Headings
 from hardware_bridge.external_tracker.params import ReadyParams
-from hardware_bridge.external_tracker.pending import Told, ToldHeading, ToldPlace
+from hardware_bridge.external_tracker.pending import HeadingReport, PendingReports, PositionReport
 from hardware_bridge.external_tracker.perception import ReadyPerception
 from hardware_bridge.external_tracker.tracks import Tracks
 from hardware_bridge.live.picture import is_sound
@@ -24,20 +24,20 @@ class Watcher:
     def __init__(self, dimensions=2, **params):
         nodes = (*(NodeConfig(id=k) for k in range(3)), NodeConfig(id=3, kind="static"))
         self.group = Constellation(nodes=nodes, dimensions=dimensions)
-        self.told, self.block = Told(), MeasurementBlock.empty(1, 4)
+        self.pending, self.block = PendingReports(), MeasurementBlock.empty(1, 4)
         self.block.valid[:] = False
         self.powered = np.ones((1, 3), dtype=bool)
         self.ready = ReadyPerception(
-            self.group, ReadyParams(**params), self.told, self.block, self.powered
+            self.group, ReadyParams(**params), self.pending, self.block, self.powered
         )
 
     def pair(self, t, i, j, pos, **said):
-        self.told.add_pair(t, (i, j), PairReading(UNNAMED, "", "", tuple(pos), **said))
+        self.pending.add_pair(t, (i, j), PairReading(UNNAMED, "", "", tuple(pos), **said))
 
     def node(self, t, k, pos=None, yaw=None, **said):
         q = None if yaw is None else (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
         pos = None if pos is None else tuple(pos)
-        self.told.add_pose(t, k, PoseReading(UNNAMED, "", pos, q_wb=q, **said))
+        self.pending.add_pose(t, k, PoseReading(UNNAMED, "", pos, q_wb=q, **said))
 
     def see(self, now):
         self.ready.view.present[:] = True
@@ -192,7 +192,7 @@ def test_what_turns_evenly_is_carried_exactly(rate):
     headings = Headings(1)
     for t in np.arange(0.0, 3.0, 0.02):  # across the wrap at pi and back
         yaw = 2.0 + rate * t
-        headings.take([(0, ToldHeading(t, (math.cos(yaw / 2), 0, 0, math.sin(yaw / 2))))])
+        headings.take([(0, HeadingReport(t, (math.cos(yaw / 2), 0, 0, math.sin(yaw / 2))))])
         assert headings.turns(t)[0] == 0.0
     assert headings.turns(t + 0.05)[0] == pytest.approx(0.05 * rate, abs=1e-12)
     assert headings.turns(t + 9.0)[0] == pytest.approx(FARTHEST * rate, abs=1e-12)
@@ -207,9 +207,9 @@ def test_a_position_is_a_distance_for_whoever_sees_ranges():
     assert view.heard[0, 0, 2] == -np.inf
 
 
-def twin(told, q, var, first_var):
+def twin(pending, q, var, first_var):
     """Reference implementation of the filter of one axis, without matrices."""
-    (t, z), *rest = told
+    (t, z), *rest = pending
     p, v, a, b, c = z, 0.0, var, 0.0, first_var
     for t2, z2 in rest:
         dt, t = t2 - t, t2
@@ -232,10 +232,10 @@ def test_the_filter_is_its_twin():
     tracks = Tracks(n, np.array([1.5, 2.0, 0.5]), np.full(n, 3.0), 0.02, 0.1)
     t = np.cumsum(rng.uniform(0.0, 0.1, 40))
     z = rng.normal(size=(n, 40, 3))
-    told = [(k, ToldPlace(t[m], tuple(z[k, m]), None, None, Status.OK, 0.0))
+    pending = [(k, PositionReport(t[m], tuple(z[k, m]), None, None, Status.OK, 0.0))
             for m in range(40) for k in range(n)]  # fmt: skip
-    tracks.take(told[:50])
-    tracks.take(told[50:])
+    tracks.take(pending[:50])
+    tracks.take(pending[50:])
     x, P = tracks.at(t[-1])
     for k, psd in enumerate((1.5, 2.0, 0.5)):
         for axis in range(3):
@@ -254,7 +254,7 @@ def test_the_covariance_is_that_of_the_errors():
     root = np.linalg.cholesky([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
     for m in range(steps):
         z = pos + std * rng.normal(size=(n, 3))
-        tracks.take([(k, ToldPlace(m * dt, tuple(z[k]), None, None, Status.OK, 0.0))
+        tracks.take([(k, PositionReport(m * dt, tuple(z[k]), None, None, Status.OK, 0.0))
                      for k in range(n)])  # fmt: skip
         last = np.concatenate([pos, vel], axis=1)
         noise = psd * rng.normal(size=(n, 3, 2)) @ root.T

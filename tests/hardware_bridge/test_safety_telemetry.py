@@ -19,7 +19,7 @@ from hardware_bridge.safety.believed import Believed
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import blank_picture
 from hardware_bridge.safety.supervisor import Supervisor
-from hardware_bridge.safety.telemetry import nothing_told
+from hardware_bridge.safety.telemetry import no_telemetry
 from relpos_env.interface.views import make_view
 from tracking.estimate import Status
 
@@ -27,7 +27,7 @@ SHAPE = (1, 2)
 
 
 def told(**fields):
-    calm = nothing_told(SHAPE, SafetyParams())
+    calm = no_telemetry(SHAPE, SafetyParams())
     return calm._replace(**{name: np.array([[value, 0.0]]) for name, value in fields.items()})
 
 
@@ -50,26 +50,26 @@ def test_rules_look_at_what_cars_say(rule, fields, cap, hold):
     state = state._replace(fault=state.fault.astype(bool))
     if rule == "battery":
         state = state._replace(cell=np.array([[fields["cell"], np.inf]]))
-    verdict = check(rule, picture(), told=state)
+    verdict = check(rule, picture(), telemetry=state)
     assert verdict.forward[0].tolist() == [cap, np.inf]
     assert verdict.hold[0].tolist() == [hold, False]
     assert not check(rule, picture()).hold.any()
 
 
 def test_a_battery_that_recovers_a_little_is_still_low():
-    state = nothing_told(SHAPE, SafetyParams())._replace(cell=np.full(SHAPE, 3.45))
-    assert np.isinf(check("battery", picture(), told=state).forward).all()
-    assert (check("battery", picture(), told=state, was_slow=True).forward == 0.3).all()
+    state = no_telemetry(SHAPE, SafetyParams())._replace(cell=np.full(SHAPE, 3.45))
+    assert np.isinf(check("battery", picture(), telemetry=state).forward).all()
+    assert (check("battery", picture(), telemetry=state, was_slow=True).forward == 0.3).all()
 
 
 def test_a_slow_watchdog_counts_as_a_longer_reaction():
     linked = np.array([[True, False]])
     caps = []
     for watchdog in (0.2, 1.0):
-        state = nothing_told(SHAPE, SafetyParams())._replace(watchdog=np.full(SHAPE, watchdog))
+        state = no_telemetry(SHAPE, SafetyParams())._replace(watchdog=np.full(SHAPE, watchdog))
         q = picture(spacing=2.0)
         q.speed[:] = 1.0
-        caps.append(check("separation", q, told=state, linked=linked).forward[0, 0])
+        caps.append(check("separation", q, telemetry=state, linked=linked).forward[0, 0])
     assert caps[1] < caps[0] or np.isinf(caps).all()
 
 

@@ -40,11 +40,11 @@ class Group:
 
     def run(self, seconds):
         """Run for some seconds; return the ranges as (time, reporting node, event)."""
-        self.air.told.clear()
+        self.air.events.clear()
         self.air.sent.clear()
         for _ in range(round(seconds / DT)):
             self.air.step(self.pos, self.pos)
-        return [t for t in self.air.told if isinstance(t.event, RangeEvent)]
+        return [t for t in self.air.events if isinstance(t.event, RangeEvent)]
 
     def error(self, told):
         """Return the error of a range to the nearest distance of all nodes with these IDs [m]."""
@@ -208,7 +208,7 @@ def test_two_nodes_with_one_id(double, both_at_once, seed):
     noticed, rest = set(), set(range(4)) - {double}
     for second in range(25):
         ranges = group.run(1.0)
-        noticed |= {t.node for t in group.air.told if isinstance(t.event, DuplicateId)}
+        noticed |= {t.node for t in group.air.events if isinstance(t.event, DuplicateId)}
         clean = [t for t in ranges if double not in (t.event.i, t.event.j)]
         group.right(clean)
         if second:  # the others go on all the time

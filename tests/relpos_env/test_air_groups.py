@@ -35,9 +35,9 @@ def test_every_node_knows_every_pair_also_when_tables_are_split(n):
     air, pos = group(n, FAST_PHY)
     run(air, pos, 2.0)
     assert all(s.members == tuple(range(n)) for s in air.sessions)
-    air.told.clear()
+    air.events.clear()
     run(air, pos, 0.3)
-    found = [t for t in air.told if isinstance(t.event, RangeEvent)]
+    found = [t for t in air.events if isinstance(t.event, RangeEvent)]
     known = {(t.node, t.event.i, t.event.j) for t in found}
     assert len(known) == n * n * (n - 1) // 2
     true = np.linalg.norm(pos[:, None] - pos[None], axis=-1)
@@ -57,7 +57,7 @@ def test_groups_of_different_numbers_take_turns_in_one_air():
             air._switch[k] = (at, node, type(session)(node, other, boot=node))
     run(air, pos, 10.0)
     for members in ({0, 1, 2}, {3, 4, 5}):
-        told = [t for t in air.told if t.node in members and isinstance(t.event, RangeEvent)]
+        told = [t for t in air.events if t.node in members and isinstance(t.event, RangeEvent)]
         assert len(told) > 600  # each group alone would have 7000; they alternate
         assert all({t.event.i, t.event.j} <= members for t in told)
 

@@ -184,7 +184,7 @@ def test_followers_keep_their_places_in_the_frame_of_the_course():
         shapes.append(task.target[0, 0] @ np.stack([direction, left], axis=1))
     assert np.allclose(shapes, shapes[0], atol=1e-9)
     assert np.all(shapes[0][1:, 0] < 0.0)
-    alone = begun("follow", state, told="leader")
+    alone = begun("follow", state, informed="leader")
     assert alone.plan[0, 0].any()
     assert not alone.plan[0, 1:].any()
     state.present[0, 0] = False
@@ -227,7 +227,7 @@ def test_followers_are_paid_for_going_along_told_or_not():
     rewards = []
     for told in ("all", "leader"):
         state = rooms(1, 3, seed=4)
-        task = make_task("follow", 3, 1, ROOM, told=told)
+        task = make_task("follow", 3, 1, ROOM, informed=told)
         task.reset(state, ALL)
         goals = []
         for t in (2.0, 2.3, 2.31):  # the reference is that of 0.3 s later

@@ -75,7 +75,7 @@ def rows(ranges, env=0):
 
 def resolved(air):
     """Return the ranges at the node with the smaller number."""
-    found = [t.event for t in air.told if isinstance(t.event, RangeEvent) and t.node == t.event.i]
+    found = [t.event for t in air.events if isinstance(t.event, RangeEvent) and t.node == t.event.i]
     return [(e.i, e.j, e.distance, e.rx_power, e.fp_power) for e in found]
 
 

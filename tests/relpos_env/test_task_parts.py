@@ -86,7 +86,7 @@ BAD = [
     ("travel", {"path": [(0.0, 0.0), (2.0, 0.0), (0.0, 0.0)]}, "path"),
     ("travel", {"path": [(0.0, 0.0), (40.0, 0.0)]}, "path"),
     ("travel", {"lookahead": -0.1}, "lookahead"),
-    ("follow", {"told": "nobody"}, "told"),
+    ("follow", {"informed": "nobody"}, "informed"),
     ("ring", {"half_axes": (0.2, 0.2)}, "half_axes"),
     ("ring", {"half_axes": (9.0, 1.0)}, "half_axes"),
     ("ring", {"half_axes": 1.0}, "half_axes"),

@@ -11,7 +11,7 @@ from tracking.filters.joint.ekf import ahrs_feedback as gyroscope
 from tracking.filters.joint.ekf import propagation
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.updates.motion_constraints import update_gyro_bias_at_rest
-from tracking.measurements import GYRO_BIAS, GYRO_VAR, N_VALUES, TOLD
+from tracking.measurements import AHRS_STATUS, GYRO_BIAS, GYRO_VAR, N_VALUES
 from tracking.vehicles import VEHICLES
 
 START_STD = 0.009
@@ -22,7 +22,7 @@ TRUSTED = VEHICLES["hand"].gyro_std
 def tell(s, bias, var, rests, begins=False):
     """Process a STATE event of node 0 with its gyroscope bias."""
     values = np.zeros((1, 1, N_VALUES))
-    values[0, 0, TOLD] = 2.0 if rests else 1.0
+    values[0, 0, AHRS_STATUS] = 2.0 if rests else 1.0
     values[0, 0, GYRO_BIAS : GYRO_BIAS + 3], values[0, 0, GYRO_VAR] = bias, var
     gyroscope.process_gyro_bias(s.nodes[0], s.preintegrated, 0, values, 0, 0, begins)
 

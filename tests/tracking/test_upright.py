@@ -11,9 +11,9 @@ from tracking.filters import FilterParams
 from tracking.filters.joint.params import JointParams
 from tracking.geometry import GRAVITY
 from tracking.measurements import (
+    AHRS_STATUS,
     GYRO_VAR,
     N_VALUES,
-    TOLD,
     UPRIGHT,
     Kind,
     MeasurementBlock,
@@ -38,8 +38,8 @@ def test_what_is_read_changes_by_what_was_turned_upright():
     stage = Orientation(Constellation(nodes=nodes, heading="initial"), OrientationParams())
     block = MeasurementBlock.of_kind(Kind.IMU, t, np.zeros(n, dtype=np.int64), imu)
     out = stage.step(block).values[0]
-    assert np.isin(out[:, TOLD], (1.0, 2.0)).all()
-    assert (out[t > 1.9, TOLD][0], out[0, TOLD]) == (2.0, 1.0)  # at rest
+    assert np.isin(out[:, AHRS_STATUS], (1.0, 2.0)).all()
+    assert (out[t > 1.9, AHRS_STATUS][0], out[0, AHRS_STATUS]) == (2.0, 1.0)  # at rest
     assert (out[:, GYRO_VAR] > 0.0).all()
     assert out[-1, GYRO_VAR] < 0.1 * out[0, GYRO_VAR]
     accel, (x, y) = out[:, 4:6], out[:, UPRIGHT : UPRIGHT + 2].T
@@ -73,7 +73,7 @@ def walk(upright, told, lean=0.0, seconds=12.0, seed=0):
     leans = tilt + np.stack([lean * t, 0.5 * lean * t], axis=1)
     values[:, 4:7] += np.cross(np.pad(leans, ((0, 0), (0, 1))), force)
     if told:
-        values[:, TOLD], values[:, UPRIGHT : UPRIGHT + 2] = 1.0, tilt
+        values[:, AHRS_STATUS], values[:, UPRIGHT : UPRIGHT + 2] = 1.0, tilt
         values[:, GYRO_VAR] = 1e-4 if lean else 1e-8
     other = np.arange(len(t)) % len(FIXED)
     z = np.linalg.norm(FIXED[other] - place, axis=1) + rng.normal(0.0, 0.03, len(t))

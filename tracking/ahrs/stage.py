@@ -22,7 +22,7 @@ from tracking.ahrs.vqf import (
     update_vqf,
 )
 from tracking.kernels.jit import kernel, small_kernel
-from tracking.measurements import ACCEL_NOISE, GYRO_BIAS, GYRO_VAR, TOLD, UPRIGHT
+from tracking.measurements import ACCEL_NOISE, AHRS_STATUS, GYRO_BIAS, GYRO_VAR, UPRIGHT
 from tracking.sanity.imu import GOOD, inspect_sample, noise_scale
 from tracking.sanity.saturation import find_limits
 
@@ -134,7 +134,7 @@ def tell_upright(s, e, n, cos, sin, values, k):
     q[e, n, TURN] = q[e, n, TURN + 1] = 0.0
     m[e, n, TURNED] += turn_cos * x - turn_sin * y
     m[e, n, TURNED + 1] += turn_sin * x + turn_cos * y
-    values[e, k, TOLD] = 2.0 if s.rest[e, n, RESTING] != 0.0 else 1.0
+    values[e, k, AHRS_STATUS] = 2.0 if s.rest[e, n, RESTING] != 0.0 else 1.0
     values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1] = m[e, n, TURNED], m[e, n, TURNED + 1]
     for a in range(3):
         values[e, k, GYRO_BIAS + a] = s.bias[e, n, BIAS + a]

@@ -30,7 +30,7 @@ ALL = np.concatenate([-np.arange(0.4, 4.1, 0.4)[::-1], NEAR, np.arange(0.4, 4.1,
 LEAST_GAIN, LEAST_ALONE = 0.01, 0.02
 """[-] Least gain in log-likelihood of a range: for all nodes together, and for a single node,
 since its mount on its vehicle looks a little like a clock offset."""
-TOLD = 0.04
+NEGLIGIBLE = 0.04
 """[s] Largest offset that counts as none."""
 CARRIED = 0.5
 """[s] Largest offset that is corrected; larger ones are errors."""
@@ -99,7 +99,7 @@ def _offset(log: Log, nodes: tuple[int, ...], suspects: dict[int, F64]) -> Expla
     found = best(cost, ALL if is_far else NEAR, LEAST_GAIN, most, than)
     if found is not None and not found.is_within and not is_far:
         found = best(cost, ALL, LEAST_GAIN, most, than)
-    if found is None or abs(found.at) <= TOLD:
+    if found is None or abs(found.at) <= NEGLIGIBLE:
         return None
     if found.is_within and abs(found.at) > NEAR[-1]:
         coarse = found.at

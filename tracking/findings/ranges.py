@@ -25,7 +25,7 @@ SCALES = np.array([-0.09, -0.06, -0.03, 0.0, 0.03, 0.06, 0.09])
 """[-] Trial relative errors of all ranges."""
 LEAST_GAIN = 0.01
 """[-] Least gain in log-likelihood of a range."""
-TOLD_OFFSET, TOLD_SCALE = 0.1, 0.015
+NEGLIGIBLE_OFFSET, NEGLIGIBLE_SCALE = 0.1, 0.015
 """[m], [-] Largest offset and relative error that count as none."""
 
 
@@ -58,11 +58,11 @@ def find_range_errors(log: Log, progress: Progress) -> list[Finding]:
     if is_surveyed:
         scale = best(lambda x: cost(0.0, x), SCALES, LEAST_GAIN, most_surprise(log))
     found = list[Finding]()
-    if offset is not None and abs(offset.at) > TOLD_OFFSET:
+    if offset is not None and abs(offset.at) > NEGLIGIBLE_OFFSET:
         way = "shorter" if offset.at > 0.0 else "longer"
         text = f"ranges of all pairs fit better when {abs(offset.at):.2f} m {way}"
         found.append(Finding("range-offset", (), text))
-    if scale is not None and abs(scale.at) > TOLD_SCALE:
+    if scale is not None and abs(scale.at) > NEGLIGIBLE_SCALE:
         way = "shorter" if scale.at > 0.0 else "longer"
         text = f"ranges of all pairs fit better when {100 * abs(scale.at):.0f} % {way}"
         found.append(Finding("range-scale", (), text))

@@ -58,7 +58,7 @@ class Session:
         self._turns = Turns(node_id, params, self._slots, self._members, self._peers, self._dice)
         self._time, self._joining = OwnTime(), Joining(self._dice)
         self._out: list[Output] = []
-        self._told = (self.role, self.root), self.members
+        self._last_output = (self.role, self.root), self.members
 
     @property
     def members(self) -> tuple[int, ...]:
@@ -291,10 +291,10 @@ class Session:
     def _give(self) -> list[Output]:
         """Return the outputs, and changes since the last time."""
         out, self._out = self._out, []
-        role, members = self._told
+        role, members = self._last_output
         if role != (self.role, self.root):
             out.append(RoleChanged(self.role, self.root))
         if members != self.members:
             out.append(MembersChanged(self.members, members))
-        self._told = (self.role, self.root), self.members
+        self._last_output = (self.role, self.root), self.members
         return out

@@ -87,8 +87,8 @@ def _measure(
         emit_json([each.record for each in found])
     else:
         for each in found:
-            told = each.problem or f"stops by itself after {each.seconds:g} s"
-            click.echo(f"  {'problem' if each.problem else 'ok     '} cars.{each.car}: {told}")
+            text = each.problem or f"stops by itself after {each.seconds:g} s"
+            click.echo(f"  {'problem' if each.problem else 'ok     '} cars.{each.car}: {text}")
             if not (each.problem or write):
                 click.echo(f"          [cars.{each.car}] watchdog = {each.seconds:g}")
     if any(each.problem for each in found):
@@ -114,11 +114,11 @@ def _print_port(port: PortReport) -> None:
     info = port.info
     what = " ".join(x for x in (info.maker, info.product) if x)
     number = f'port = "serial:{info.serial_number}"' if info.serial_number else ""
-    told = [x for x in (what, number, info.by_id) if x]
+    parts = [x for x in (what, number, info.by_id) if x]
     if port.users:
-        told.append("in use by " + ", ".join(port.users))
+        parts.append("in use by " + ", ".join(port.users))
     state = "ok     " if not port.remedy else "problem"
-    click.echo(f"  {state} {info.path}" + "".join(f"  {x}" for x in told))
+    click.echo(f"  {state} {info.path}" + "".join(f"  {x}" for x in parts))
     if port.remedy:
         click.echo(f"          no permission: {port.remedy}")
 
@@ -135,11 +135,11 @@ def _print_link(link: LinkReport) -> None:
     click.echo(line)
     for node in link.nodes:
         name = f"node {node.node}" if node.known else f"device {node.node}"
-        told = [f"IMU {node.imu_hz:.0f} Hz"] if node.imu_hz else []
-        told += [f"positions {node.positions_hz:.0f} Hz"] if node.positions_hz else []
-        told += [f"range to {to} {hz:.1f} Hz" for to, hz in node.ranges_hz.items()]
+        parts = [f"IMU {node.imu_hz:.0f} Hz"] if node.imu_hz else []
+        parts += [f"positions {node.positions_hz:.0f} Hz"] if node.positions_hz else []
+        parts += [f"range to {to} {hz:.1f} Hz" for to, hz in node.ranges_hz.items()]
         if node.missing_share:
-            told.append(f"{100 * node.missing_share:.1f} % missing")
-        click.echo(f"          {name}: {', '.join(told) or 'status only'}")
+            parts.append(f"{100 * node.missing_share:.1f} % missing")
+        click.echo(f"          {name}: {', '.join(parts) or 'status only'}")
     for problem in link.problems:
         click.echo(f"          {problem}")

@@ -114,7 +114,7 @@ class _Screen:
     def __init__(self, as_json: bool, stop_source: str) -> None:
         from agents.hardware.drive.keys import PipedKeys, TerminalKeys
 
-        self._json, self._n, self._told = as_json, 0, 0
+        self._json, self._n, self._n_shown = as_json, 0, 0
         self._source = PipedKeys() if stop_source == "stdin" else TerminalKeys()
         self._live: Any = None
         self._keys: Any = None
@@ -162,9 +162,9 @@ class _Screen:
             self._live.update(_table(HEADER, car_rows(bridge, env), notices[-LINES:], keys))
             self._live.refresh()
             return
-        for text in notices[self._told :]:
+        for text in notices[self._n_shown :]:
             click.echo(text, err=True)
-        self._told = len(notices)
+        self._n_shown = len(notices)
         if self._json and self._n % EVERY == 0:
             emit_json([status_record(bridge, env)])
             sys.stdout.flush()
@@ -183,9 +183,9 @@ def _table(header: tuple[str, ...], rows: list[list[str]], notices: list[str], k
         table.add_column(escape(name), no_wrap=True, overflow="ellipsis")
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
-    told = [Text(notice, no_wrap=True, overflow="ellipsis") for notice in notices]
+    texts = [Text(notice, no_wrap=True, overflow="ellipsis") for notice in notices]
     # On a small terminal the end is cut off.
-    return Group(Text(keys, style="bold"), table, *told)
+    return Group(Text(keys, style="bold"), table, *texts)
 
 
 def _text(value: Any) -> str:

@@ -106,8 +106,8 @@ def demo(
         pictures = Gif(every=2, interval=DECISION)
         titles = {"estimate": "on estimates", "truth": "on the truth", "nothing": "on nothing"}
 
-        def watch(frames: dict[str, Any], told: str) -> None:
-            room.show(frames, f"cars drive {titles[told]}")
+        def watch(frames: dict[str, Any], information: str) -> None:
+            room.show(frames, f"cars drive {titles[information]}")
 
         with progress_bar("drives", shown=not room.shown) as tell:
             result: DemoResult = run(
@@ -137,7 +137,7 @@ def demo(
     print_tracks(result.tracks)
     print_table(
         f"Formation error, {result.driver} drives",
-        ["the cars are told", f"mean after {SETTLE:.0f} s [m]"],
+        ["information of the cars", f"mean after {SETTLE:.0f} s [m]"],
         [
             ["what the tracker estimates", metres(result.formation_error)],
             ["the truth", metres(result.formation_error_truth)],

@@ -42,8 +42,8 @@ def export(
             f"exporting needs {error.name}: pip install 'relpos-env[train]'"
         ) from error
     names = {run.resolve().name, name or run.resolve().name}
-    told = read_results(results, names) if results is not None else []
-    path = export_policy(run, out, name=name, results=told, last=last, overwrite=overwrite)
+    measured = read_results(results, names) if results is not None else []
+    path = export_policy(run, out, name=name, results=measured, last=last, overwrite=overwrite)
     if as_json:
         from agents.policies import load_policy
 

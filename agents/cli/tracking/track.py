@@ -129,8 +129,8 @@ def track(
                         progress=report,
                     )
                 )
-    told = {f"{r.log.name}, {f.severity}: {f.text}": None for r in results for f in r.findings}
-    click.echo("\n".join(told), err=True, nl=bool(told))
+    texts = {f"{r.log.name}, {f.severity}: {f.text}": None for r in results for f in r.findings}
+    click.echo("\n".join(texts), err=True, nl=bool(texts))
     if out is not None:
         _write(out, results)
     if write_noise:

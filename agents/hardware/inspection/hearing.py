@@ -208,9 +208,9 @@ def _count(voices: dict[str | None, Voice], reading: Reading) -> None:
     if isinstance(reading, PairReading | PoseReading):
         names = (reading.i, reading.j) if isinstance(reading, PairReading) else (reading.node,)
         for name in names:
-            told = voices.setdefault(name, Voice())
-            told.readings += 1
-            told.positions += 1
+            voice = voices.setdefault(name, Voice())
+            voice.readings += 1
+            voice.positions += 1
         return
     voice = voices.setdefault(source.device, Voice())
     voice.readings += 1

@@ -201,12 +201,12 @@ def as_record(t: float, reading: Reading) -> dict[str, Any]:
 def as_line(t: float, reading: Reading) -> str:
     """Return a reading as a line of a table."""
     record = as_record(t, reading)
-    told = [
+    values = [
         f"{name} {_short(value)}"
         for name, value in record.items()
         if name not in ("kind", "t_s", "device", "boot", "ticks")
     ]
-    return f"{t:9.3f}  {record['kind']:<9}  {record.get('device', '-'):<6}  {'  '.join(told)}"
+    return f"{t:9.3f}  {record['kind']:<9}  {record.get('device', '-'):<6}  {'  '.join(values)}"
 
 
 def kind_of(reading: Reading) -> str:

@@ -159,7 +159,7 @@ class _Trial:
         self._car, self._driver, self._links = car, driver, links
         self._speeds: list[tuple[float, float]] = []
         """Time [s] and speed [m/s] of its telemetry readings."""
-        self._told_at = 0.0
+        self._commanded_at = 0.0
 
     def run(self) -> Watchdog:
         """Spin the wheels up, stop sending commands, and measure the time until they slow down."""
@@ -194,7 +194,7 @@ class _Trial:
 
         if not self._wait(lambda: len(slow()) == IN_A_ROW and all(slow()), LONGEST):
             return self._result(None, f"it went on for {LONGEST:g} s: set its controller's timeout")
-        seconds = self._speeds[-IN_A_ROW][0] - self._told_at
+        seconds = self._speeds[-IN_A_ROW][0] - self._commanded_at
         return self._result(math.ceil(seconds / GRAIN) * GRAIN, "")
 
     def _at(self) -> float:
@@ -210,7 +210,7 @@ class _Trial:
                 name = self._car.port.name
                 if speed is not None:
                     self._links.send(name, self._driver.drive(speed, 0.0))
-                    self._told_at = now
+                    self._commanded_at = now
                 self._links.send(name, self._driver.ask())
             for chunk in self._links.wait(STEP / 4):
                 for reading in self._driver.telemetry.feed(chunk.data):

@@ -109,7 +109,7 @@ class LiveTable:
         if monitor.decisions % EVERY:
             return
         snapshot = monitor.snapshot()
-        told = [
+        texts = [
             Text(f"{t:7.1f} s  {text}", no_wrap=True, overflow="ellipsis")
             for t, text in self._notices
         ]
@@ -118,7 +118,7 @@ class LiveTable:
         self._live.update(
             Group(
                 Text(head, style="bold"),
-                *told,
+                *texts,
                 table(list(NODE_HEADER), node_rows(snapshot)),
                 table(pair_header(snapshot), pair_rows(snapshot), status=True),
             ),

@@ -42,12 +42,12 @@ def approach(
     )
     limit = p.max_steering * np.where(counts, share, 1.0)
     sides = m.recent.left[..., None], m.recent.right[..., None]
-    told = np.where(on_left, *sides)
+    bound = np.where(on_left, *sides)
     tightest = p.turning_radius * np.tan(p.max_steering)
-    radius = tightest / np.maximum(np.tan(np.maximum(limit, told)), 1e-3)
+    radius = tightest / np.maximum(np.tan(np.maximum(limit, bound)), 1e-3)
     # If it may not turn towards an obstacle at all, it may drive on while it turns away from it.
     away = m.recent.steering[..., None] * np.where(on_left, -1.0, 1.0)
-    away = np.where(told == 0.0, np.clip(away, 0.0, p.max_steering - limit), 0.0)
+    away = np.where(bound == 0.0, np.clip(away, 0.0, p.max_steering - limit), 0.0)
     turned = np.maximum(np.where(on_left, *sides[::-1]), limit)
     # The centre of a car moves off its heading in a turn: backwards, to the outside.
     inner, outer = REAR / radius, REAR / tightest * np.tan(turned)

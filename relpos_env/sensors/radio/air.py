@@ -60,7 +60,7 @@ class Sent:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class SessionEvent:
     """An event returned by a session."""
 
     t: float
@@ -102,7 +102,7 @@ class Air:
         self._window = 0
         self.sent: list[Sent] = []
         """Transmitted frames; callers may clear the list."""
-        self.told: list[Told] = []
+        self.events: list[SessionEvent] = []
         """Events returned by the sessions; callers may clear the list."""
 
     @property
@@ -243,7 +243,7 @@ class Air:
             if isinstance(output, Transmission):
                 self._send(k, output)
             else:
-                self.told.append(Told(self.t + t, k, output))
+                self.events.append(SessionEvent(self.t + t, k, output))
         self._plan(k, t)
 
     def _deadline(self, k: int) -> int:

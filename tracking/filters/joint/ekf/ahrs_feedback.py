@@ -33,10 +33,10 @@ from tracking.filters.joint.ekf.columns import (
 from tracking.geometry import GRAVITY
 from tracking.kernels.jit import small_kernel
 from tracking.maths.angles import turn
-from tracking.measurements import GYRO_BIAS, GYRO_VAR, TOLD, UPRIGHT
+from tracking.measurements import AHRS_STATUS, GYRO_BIAS, GYRO_VAR, UPRIGHT
 
 RESTS = 2.0
-"""Value of `TOLD` at rest."""
+"""Value of `AHRS_STATUS` at rest."""
 
 
 @small_kernel
@@ -55,7 +55,7 @@ def process_gyro_bias(node, pre, i, values, e, k, begins):
         pre[i, GYRO_CHANGE] += d0
         pre[i, GYRO_CHANGE + 1] += d1
         pre[i, GYRO_CHANGE + 2] += d2
-        if values[e, k, TOLD] == RESTS and 0.0 < var < node.gyro_var:
+        if values[e, k, AHRS_STATUS] == RESTS and 0.0 < var < node.gyro_var:
             gained = 1.0 / var - 1.0 / node.gyro_var
             pre[i, GYRO_INFORMATION] += gained
             pre[i, GYRO_SUM] += gained * g0 + d0 / node.gyro_var
@@ -134,7 +134,7 @@ def propagate_gyro_bias_sensitivity(node, z, w, i, scale):
 @small_kernel
 def process_tilt_correction(node, pre, i, values, e, k, is_new):
     """Process the tilt correction of node i between two STATE events, the later in column k."""
-    reported = node.i_acc_bias >= 0 and values[e, k, TOLD] != 0.0
+    reported = node.i_acc_bias >= 0 and values[e, k, AHRS_STATUS] != 0.0
     if reported:
         turned0, turned1 = values[e, k, UPRIGHT], values[e, k, UPRIGHT + 1]
         begins = is_new or not node.has_ahrs_feedback
