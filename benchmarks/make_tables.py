@@ -233,7 +233,7 @@ def decoders() -> str:
         when = "its clock" if entry.has_time else "on arrival"
         check = "with a key" if entry.keyed else "yes" if entry.checked else "no"
         rows.append([f"`{name}`", entry.device, tells, who, when, str(entry.baud), check])
-    head = ("format", "device", "tells", "who speaks", "time", "baud", "check sum")
+    head = ("format", "device", "tells", "sender", "time", "baud", "check sum")
     return markdown(head, rows, right="baud")
 
 

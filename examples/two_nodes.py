@@ -64,7 +64,7 @@ while events[0][0] < SECONDS:
         if node.time_of(node.session.deadline, t) <= t + 1e-9:
             act_on(node.session.timeout(node.session.deadline), node, t)
     elif t < node.on_air_until and what != "start":
-        continue  # who sends hears nothing
+        continue  # a transmitting radio does not receive
     elif what == "frame":
         act_on(node.session.frame(*data, now), node, t)
     else:

@@ -30,7 +30,7 @@ def bench_radio(*, progress: Callable[[float], None] | None = None) -> list[dict
     cases = ((3, 256), (6, 128), (10, 64), (20, 16), (50, 4))
     rows = []
     for k, (n, envs) in enumerate(cases):
-        cost, heard = radio_cost(n, envs)
+        cost, resolved = radio_cost(n, envs)
         reference = _reference_cost(n)
         rows.append(
             {
@@ -42,7 +42,7 @@ def bench_radio(*, progress: Callable[[float], None] | None = None) -> list[dict
                 "peer_value": reference,
                 "ratio": reference / cost,
                 "n": n,
-                "whole_share": heard,
+                "whole_share": resolved,
             }
         )
         if progress is not None:
@@ -66,9 +66,9 @@ def radio_cost(n: int, envs: int) -> tuple[float, float]:
         for _ in range(settle if repeat < 0 else windows):
             before, after = motion(w * DT), motion((w + 1) * DT)
             began = time.perf_counter()
-            heard = radio.step(before, after, boxes)
+            ranged = radio.step(before, after, boxes)
             spent += time.perf_counter() - began
-            count += int(heard.count.sum())
+            count += int(ranged.count.sum())
             w += 1
         if repeat >= 0:
             best, ranges = min(best, spent), ranges + count

@@ -18,7 +18,7 @@ DT = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class ReceivedMessage:
     """A message as received by an ideal observer."""
 
     start: float
@@ -64,15 +64,15 @@ class Group:
                 return
         raise UsageError(f"protocol: {len(nodes)} nodes did not find together in {limit:g} s")
 
-    def listen(self) -> list[Heard]:
+    def listen(self) -> list[ReceivedMessage]:
         """Return the messages since the last call."""
-        heard = []
+        received = []
         for sent in self.air.sent:
             start = sent.t - self._phy.header_time
             end = start + airtime(self._phy, len(sent.data))
-            heard.append(Heard(start, end, decode(sent.data)))
+            received.append(ReceivedMessage(start, end, decode(sent.data)))
         self.air.sent.clear()
-        return sorted(heard, key=lambda h: h.start)
+        return sorted(received, key=lambda h: h.start)
 
 
 def radio_params(**session: object) -> RadioSimParams:

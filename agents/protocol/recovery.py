@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from agents.errors import UsageError
-from agents.protocol.group import DT, Group, Heard, radio_params
+from agents.protocol.group import DT, Group, ReceivedMessage, radio_params
 from tracking.ranging.frames.wire import Type
 
 EVENTS = ("responder-join", "responder-leave", "initiator-loss")
@@ -93,13 +93,15 @@ def _responder_comes_and_goes(mode: str, rng: np.random.Generator) -> tuple[floa
     node = NODES - 1
     on = group.t + (after := float(rng.uniform(0.0, DT)))
     group.switch_on(node, after)
-    joined, named = _wait(group, "responder-join", lambda heard: _known(heard, node))
+    joined, named = _wait(group, "responder-join", lambda received: _known(received, node))
     group.assemble(range(NODES), limit=20.0)
     group.run(float(rng.uniform(0.1, 0.2)))
     before = group.listen()[-1]
     off = group.t + (after := float(rng.uniform(0.0, DT)))
     group.air.switch_off(node, at=after)
-    (left,) = _wait(group, "responder-leave", lambda heard: _closed([before, *heard], node, off))
+    (left,) = _wait(
+        group, "responder-leave", lambda received: _closed([before, *received], node, off)
+    )
     return joined - on, named - on, left - off
 
 
@@ -111,43 +113,43 @@ def _initiator_goes(mode: str, rng: np.random.Generator) -> float:
     group.listen()
     off = group.t + (after := float(rng.uniform(0.0, DT)))
     group.air.switch_off(0, at=after)  # ... and drops out
-    (recovered,) = _wait(group, "initiator-loss", lambda heard: _whole_round(heard, 0, off))
+    (recovered,) = _wait(group, "initiator-loss", lambda received: _whole_round(received, 0, off))
     return recovered - off
 
 
 def _wait(
-    group: Group, event: str, found: Callable[[list[Heard]], tuple[float, ...] | None]
+    group: Group, event: str, found: Callable[[list[ReceivedMessage]], tuple[float, ...] | None]
 ) -> tuple[float, ...]:
     """Run until `found` returns times in the received messages; return these times [s]."""
-    heard: list[Heard] = []
+    received: list[ReceivedMessage] = []
     limit = group.t + LIMIT
     while group.t < limit:
         group.run(DT)
-        heard += group.listen()
-        when = found(heard)
+        received += group.listen()
+        when = found(received)
         if when is not None and max(when) < group.t:
             return when
     raise UsageError(f"protocol: {event} did not end within {LIMIT:g} s")
 
 
-def _known(heard: list[Heard], node: int) -> tuple[float, float] | None:
+def _known(received: list[ReceivedMessage], node: int) -> tuple[float, float] | None:
     """Return the end of a node's join, and of the next request that lists the node [s]."""
-    spoken = None
-    for h in heard:
-        if h.frame.src == node and spoken is None:
-            spoken = h.end
+    joined = None
+    for h in received:
+        if h.frame.src == node and joined is None:
+            joined = h.end
         if h.frame.type is Type.JOIN and h.frame.src == node:
-            spoken = h.end
+            joined = h.end
         if h.frame.type is Type.REQUEST and any(e.id == node for e in h.frame.entries):
-            return None if spoken is None else (spoken, h.end)
+            return None if joined is None else (joined, h.end)
     return None
 
 
-def _closed(heard: list[Heard], node: int, off: float) -> tuple[float] | None:
+def _closed(received: list[ReceivedMessage], node: int, off: float) -> tuple[float] | None:
     """Return the start of the first message after the empty slot of a node [s]."""
     slot = NODES - 1  # slot of the largest ID
     at = -1
-    for h in heard:
+    for h in received:
         if h.start < off:
             at = h.frame.slot if h.frame.src != node or h.end < off else -1
         elif h.frame.src != node and h.frame.type is Type.REQUEST:
@@ -159,17 +161,17 @@ def _closed(heard: list[Heard], node: int, off: float) -> tuple[float] | None:
     return None
 
 
-def _whole_round(heard: list[Heard], node: int, off: float) -> tuple[float] | None:
+def _whole_round(received: list[ReceivedMessage], node: int, off: float) -> tuple[float] | None:
     """Return the end of the first round after a loss with messages of all other nodes [s]."""
     others = {k for k in range(NODES) if k != node}
-    spoken: set[int] = set()
-    for h in heard:
+    sources: set[int] = set()
+    for h in received:
         if h.start < off:
             continue
         if h.frame.type is Type.REQUEST:
-            spoken = set()
+            sources = set()
         if h.frame.type in (Type.REQUEST, Type.REPLY) and h.frame.root != node:
-            spoken.add(h.frame.src)
-            if spoken == others:
+            sources.add(h.frame.src)
+            if sources == others:
                 return (h.end,)
     return None

@@ -66,14 +66,14 @@ def _whole_rounds(seed: int, mode: str, k: int) -> F64:
         else:
             group.air.switch_off(node)
     group.run(start + END - group.t)
-    ends, spoken = [], set[int]()
+    ends, sources = [], set[int]()
     for h in group.listen():
         if h.frame.type is Type.REQUEST:
-            spoken = set()
-        spoken.add(h.frame.src)
+            sources = set()
+        sources.add(h.frame.src)
         here = {1, 2, 3, 4} | {k for t, _, k, powered in SCRIPT if powered and t <= h.end - start}
         here -= {k for t, _, k, powered in SCRIPT if not powered and t <= h.end - start}
-        if h.frame.type is not Type.JOIN and spoken >= here:
+        if h.frame.type is not Type.JOIN and sources >= here:
             ends.append(h.end - start)
-            spoken = set()
+            sources = set()
     return np.array(ends)

@@ -28,7 +28,7 @@ void car_start(void);
 void car_loop(void);
 
 static relpos_receiver receiver; /* begins with zeros */
-static uint32_t boot, sequence, last_motion, last_command, last_heard;
+static uint32_t boot, sequence, last_motion, last_command, last_received;
 static uint32_t host_boot, host_sequence, least_boot, least_delay;
 static int has_host, moves;
 static float steering_now;
@@ -72,7 +72,7 @@ static int is_late(uint32_t its_time, uint32_t now, int is_first) {
         least_delay = delay;
         return 0;
     }
-    least_delay += (now - last_heard) / 1000u;
+    least_delay += (now - last_received) / 1000u;
     if (delay - least_delay >= 0x80000000u) least_delay = delay; /* quicker than any before */
     return delay - least_delay > MOST_LATE;
 }
@@ -92,7 +92,7 @@ static void obey(const relpos_frame *f, uint32_t now) {
     has_host = 1;
     host_boot = f->boot;
     host_sequence = f->sequence;
-    last_heard = now;
+    last_received = now;
     if (late && !(command->flags & RELPOS_COMMAND_FLAGS_BRAKE)) return;
     last_command = now;
     if (command->flags & RELPOS_COMMAND_FLAGS_BRAKE) {

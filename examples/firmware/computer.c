@@ -8,7 +8,7 @@
  *     cc ... -DCAR -o car examples/firmware/car_skeleton.c examples/firmware/computer.c
  *     ./car 1000 < commands.txt         lines of a time [ms] and the bytes that came then, in hex
  *
- * What the motor is told goes to stderr: time [ms], speed [m/s], steering [rad], or "brake".
+ * The commands of the motor go to stderr: time [ms], speed [m/s], steering [rad], or "brake".
  */
 #include "board.h"
 

@@ -63,11 +63,11 @@ def read_links(
         if len(set(named.values())) < len(named):
             raise at.key("ids").error("two devices are the same node")
         if link.node is not None and link.key is not None:
-            raise at.key("node").error("signed messages say who speaks, leave it out")
+            raise at.key("node").error("signed messages name their sender, leave it out")
         if link.node is not None:
             check_node(link.node, group, at.key("node"))
         elif not (entry.names_itself or entry.tells_of_others):
-            raise at.key("node").error(f"missing: {link.format} does not say who speaks")
+            raise at.key("node").error(f"missing: {link.format} does not name the sender")
         is_scanner = ScanReading in entry.tells
         if is_scanner:
             _check_scanner(link, named, raw, group, at)

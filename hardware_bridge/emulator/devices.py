@@ -101,14 +101,14 @@ class CarDevice:
         self._clock = NodeClock()
         self._off_until = self._silent_until = -np.inf
         self._next = self._next_status = 0.0
-        self.heard = False
+        self.received_any = False
         """True once the host has sent anything."""
 
     def listen(self, t: float, t_ns: int) -> tuple[float, float]:
         """Process bytes of the host; return the commanded speed [m/s] and steering angle [rad]."""
         self.line.replug_if_due(t)
         data = self.line.port.read()
-        self.heard |= bool(data)
+        self.received_any |= bool(data)
         if t < self._off_until:
             return 0.0, 0.0
         if data:

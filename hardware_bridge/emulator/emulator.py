@@ -146,7 +146,7 @@ class Emulator:
         """
         for car in self.cars:
             car.listen(self.world.t, t_ns)
-        return any(car.heard for car in self.cars)
+        return any(car.received_any for car in self.cars)
 
     def close(self) -> None:
         """Unplug all lines."""

@@ -18,7 +18,7 @@ class LineCounts:
     """Bytes accepted by the line."""
     dropped: int = 0
     """Bytes lost because the line was full: the host did not read in time."""
-    unheard: int = 0
+    unread: int = 0
     """Bytes lost because the port was not open or the device was unplugged."""
     read: int = 0
 
@@ -68,7 +68,7 @@ class MemoryPort:
     def write(self, data: bytes) -> None:
         """Send to the host; see `DevicePort`."""
         if not self._plugged:
-            self.counts.unheard += len(data)
+            self.counts.unread += len(data)
             return
         taken = data[: MOST_KEPT - len(self._to_host)]
         self._to_host += taken

@@ -65,7 +65,7 @@ class PtyPort:
         if not data:
             return
         if self._fd is None or not self.is_open:
-            self.counts.unheard += len(data)
+            self.counts.unread += len(data)
             return
         try:
             taken = os.write(self._fd, data)
@@ -74,7 +74,7 @@ class PtyPort:
         except OSError as error:
             if error.errno not in GONE:
                 raise
-            self.counts.unheard += len(data)
+            self.counts.unread += len(data)
             return
         self.counts.written += taken
         self.counts.dropped += len(data) - taken

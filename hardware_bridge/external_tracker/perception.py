@@ -167,13 +167,13 @@ class ReadyPerception:
 
     def _note_distances(self) -> None:
         """Store positions as ranges, too, for readers of ranges."""
-        e, view, n = self.estimate, self.view, self.view.heard.shape[1]
+        e, view, n = self.estimate, self.view, self.view.t_last_range.shape[1]
         cars = (self._i < n) & (self._j < n) & (e.status[0] != Status.ABSENT)
         i, j = self._i[cars], self._j[cars]
         t_report = e.t[0] - e.age[0, cars]
         length = np.linalg.norm(e.pos_ij_w[0, cars], axis=1)
-        newer = (t_report > view.heard[0, i, j]) & (e.age[0, cars] <= self._params.stale)
+        newer = (t_report > view.t_last_range[0, i, j]) & (e.age[0, cars] <= self._params.stale)
         for a, b in ((i, j), (j, i)):
-            view.heard[0, a[newer], b[newer]] = t_report[newer]
+            view.t_last_range[0, a[newer], b[newer]] = t_report[newer]
             view.distance[0, a[newer], b[newer]] = length[newer]
             view.gap[0, a[newer], b[newer]] = 0.0

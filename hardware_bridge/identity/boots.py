@@ -81,26 +81,26 @@ class ClaimedBoots:
     def __init__(self, params: IdentityParams) -> None:
         self._params = params
         self._boot: int | None = None
-        self._heard: dict[int, _Boot] = {}
+        self._boots: dict[int, _Boot] = {}
         """Current and previous boots, oldest first."""
         self._restarts: deque[int] = deque()
 
     def check(self, link: str, boot: int, sequence: int | None, t_ns: int) -> Verdict:
         """Classify a message and store its number."""
-        if boot not in self._heard:
+        if boot not in self._boots:
             return self._begin(link, boot, sequence, t_ns)
-        heard = self._heard[boot]
+        state = self._boots[boot]
         if boot == self._boot:
-            heard.link = link
-        place = heard.place(sequence)
+            state.link = link
+        place = state.place(sequence)
         if boot == self._boot:
             return Verdict.UNNUMBERED if sequence is None else OF_PLACE[place]
         if place in (Place.SEEN, Place.OLD):
             return Verdict.DUPLICATE
         if place is Place.AHEAD:
-            heard.stragglers += 1
-            late = t_ns - heard.over_ns > self._params.straggle * NS
-            if late or heard.stragglers > self._params.stragglers:
+            state.stragglers += 1
+            late = t_ns - state.over_ns > self._params.straggle * NS
+            if late or state.stragglers > self._params.stragglers:
                 self.twins = self._where(link)
                 return Verdict.TWIN
         return Verdict.STALE
@@ -109,7 +109,7 @@ class ClaimedBoots:
         """Classify the first message of a boot."""
         first = self._boot is None
         if self._boot is not None:
-            self._heard[self._boot].over_ns = t_ns
+            self._boots[self._boot].over_ns = t_ns
             self._restarts.append(t_ns)
             while self._restarts[0] < t_ns - self._params.restart * NS:
                 self._restarts.popleft()
@@ -119,16 +119,16 @@ class ClaimedBoots:
                     f"last on link {link}"
                 )
                 return Verdict.TWIN
-        if len(self._heard) >= MOST_BOOTS:
-            del self._heard[next(iter(self._heard))]
+        if len(self._boots) >= MOST_BOOTS:
+            del self._boots[next(iter(self._boots))]
         window = None if sequence is None else SequenceWindow(sequence, endless=True)
-        self._boot, self._heard[boot] = boot, _Boot(window, link)
+        self._boot, self._boots[boot] = boot, _Boot(window, link)
         return Verdict.FRESH if first else Verdict.REBOOT
 
     def _where(self, link: str) -> str:
         """Return the notice about two devices, one of which sends on this link."""
         assert self._boot is not None
-        return two_devices(self._heard[self._boot].link, link)
+        return two_devices(self._boots[self._boot].link, link)
 
 
 def two_devices(link: str, other: str) -> str:

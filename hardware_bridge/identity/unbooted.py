@@ -17,7 +17,7 @@ MOST_DEVICES = 16
 
 
 @dataclass(slots=True)
-class _Heard:
+class _LastMessage:
     """Last link of a device that names itself."""
 
     link: str
@@ -50,7 +50,7 @@ class Unbooted:
 
     def __init__(self, params: IdentityParams) -> None:
         self._params = params
-        self._heard: dict[str, _Heard] = {}
+        self._last_messages: dict[str, _LastMessage] = {}
         self._numbers: dict[tuple[str | None, str], _Numbers] = {}
 
     def check(self, link: str, device: str | None, sequence: int | None, t_ns: int) -> Verdict:
@@ -77,21 +77,21 @@ class Unbooted:
 
     def _is_elsewhere(self, link: str, device: str, t_ns: int) -> bool:
         """Return whether a device alternates between this link and another."""
-        heard = self._heard.get(device)
-        if heard is None:
-            _make_room(self._heard)
-            self._heard[device] = _Heard(link, t_ns)
+        last = self._last_messages.get(device)
+        if last is None:
+            _make_room(self._last_messages)
+            self._last_messages[device] = _LastMessage(link, t_ns)
             return False
-        if link != heard.link:
-            soon = t_ns - heard.t_ns < self._params.change * NS
-            heard.changes = heard.changes + 1 if soon else 0
-            if heard.changes >= self._params.changes:
-                self.twins = two_devices(heard.link, link)
+        if link != last.link:
+            soon = t_ns - last.t_ns < self._params.change * NS
+            last.changes = last.changes + 1 if soon else 0
+            if last.changes >= self._params.changes:
+                self.twins = two_devices(last.link, link)
                 return True
-            heard.link = link
-        elif t_ns - heard.t_ns >= self._params.change * NS:
-            heard.changes = 0
-        heard.t_ns = t_ns
+            last.link = link
+        elif t_ns - last.t_ns >= self._params.change * NS:
+            last.changes = 0
+        last.t_ns = t_ns
         return False
 
     def _began_anew(self, numbers: _Numbers, sequence: int, t_ns: int) -> bool:

@@ -66,7 +66,7 @@ class Intake:
         self.start_ns = start_ns
         self.events = Events()
         self.plausibility = Plausibility()
-        self.heard_ns: dict[int, int] = {}
+        self.received_ns: dict[int, int] = {}
         """Host time [ns] of each node's last accepted message, by index."""
         self.sensed_ns: dict[int, int] = {}
         """Host time [ns] of each node's last IMU or orientation sample, by index. Ranges measured
@@ -167,7 +167,7 @@ class Intake:
             if nodes and isinstance(reading, PoseReading) and reading.speed is not None:
                 moves = MotionReading(reading.source, speed=reading.speed)
                 self.motion[nodes[0]] = arrival_ns, moves
-            self.heard_ns.update(dict.fromkeys(nodes, arrival_ns))
+            self.received_ns.update(dict.fromkeys(nodes, arrival_ns))
             return
         node = self._naming.index(stream, source.device, arrival_ns)
         if node is None:
@@ -184,7 +184,7 @@ class Intake:
             return
         t_ns = stream.t_ns
         if self._use(stream, reading, node, t_ns, arrival_ns) and stream.name.startswith("links."):
-            self.heard_ns[node] = arrival_ns
+            self.received_ns[node] = arrival_ns
 
     def _judge(self, stream: Stream, source: Source, node: int, arrival_ns: int) -> None:
         """Check the identity of the sender of a message and determine the time of measurement."""
@@ -267,7 +267,7 @@ class Intake:
             values = (reading.distance, powers[0], powers[1])  # type: ignore[assignment]
         self.events.add_range(self.seconds(t_ns), (near, far), antennas, values)
         if stream.name.startswith("links."):
-            self.heard_ns[near] = self.heard_ns[far] = arrival_ns  # the far node answered
+            self.received_ns[near] = self.received_ns[far] = arrival_ns  # the far node answered
         return True
 
     def _note_fault(self, stream: Stream, node: int, fault: int, arrival_ns: int) -> None:

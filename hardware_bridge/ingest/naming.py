@@ -13,18 +13,18 @@ MOST_STRANGERS = 32
 
 
 def node_of(
-    device: str | None, speaker: int | None, ids: Mapping[str, int], *, mixed: bool = False
+    device: str | None, sender: int | None, ids: Mapping[str, int], *, mixed: bool = False
 ) -> int | None:
     """Return the id of the node that a device is; None if the configuration assigns none.
 
     Args:
         device: Name of the device as its format writes it; None for the sender.
-        speaker: Node id of the sender, None if unknown.
+        sender: Node id of the sender, None if unknown.
         ids: Node ids by device name of the link. If any are given, other devices are unknown.
         mixed: True if other devices may also be named by node ids that `ids` does not contain.
     """
     if device is None:
-        return speaker
+        return sender
     if device in ids:
         return ids[device]
     if (ids and not mixed) or not (device.isascii() and device.isdigit()):
@@ -82,5 +82,5 @@ class Naming:
         self._strangers.add(who)
         text = f"{stream.name}: device {device} is no node of the configuration; name it in its ids"
         if stream.is_car:
-            text = f"{stream.name}: device {device} speaks on its line, and is not that car"
+            text = f"{stream.name}: device {device} sends on its line, and is not that car"
         self._notices.append((t_ns, text))

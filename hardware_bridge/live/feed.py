@@ -53,7 +53,7 @@ class LiveFeed:
         if supervisor is not None:
             links.watch(supervisor.fileno())
         self._due = now_ns()
-        self._spoken = 0
+        self._heartbeat_ns = 0
         self._reported_full_disk = False
         self.report: Report | None = None
         """Latest report of the gate."""
@@ -72,7 +72,7 @@ class LiveFeed:
             self.n_late += 1
             self._due = now
         while (now := self._now_ns()) < self._due:
-            self._speak(now)
+            self._send_heartbeat(now)
             patience = min(self._due - now, WORD_NS)
             for chunk in self._links.wait(patience * 1e-9):
                 self._take(chunk)
@@ -85,7 +85,7 @@ class LiveFeed:
         self._listen()
         self._note_links()
         now = self._now_ns()
-        self._speak(now)
+        self._send_heartbeat(now)
         if self._marks is not None:
             self._marks.keep(now)
         if (report := self.report) is not None:
@@ -103,7 +103,7 @@ class LiveFeed:
         """Send a snapshot to the gate; see `Feed`."""
         if self._supervisor is not None:
             self._supervisor.send(Decision(picture))
-            self._spoken = self._now_ns()
+            self._heartbeat_ns = self._now_ns()
 
     def order(self, what: str) -> None:
         """Forward an operator command, see `Order`; ``gone`` dismisses silent cars.
@@ -132,10 +132,10 @@ class LiveFeed:
             self._recorder.add(Kind.BYTES_IN, self._index[chunk.link], chunk.t_ns, chunk.data)
         self._swarm.take(chunk)
 
-    def _speak(self, now: int) -> None:
-        if self._supervisor is not None and now - self._spoken >= WORD_NS // 2:
-            self._supervisor.send(Word(now * 1e-9, self._swarm.heard()))
-            self._spoken = now
+    def _send_heartbeat(self, now: int) -> None:
+        if self._supervisor is not None and now - self._heartbeat_ns >= WORD_NS // 2:
+            self._supervisor.send(Word(now * 1e-9, self._swarm.t_last_message()))
+            self._heartbeat_ns = now
 
     def _listen(self) -> None:
         if self._supervisor is None:

@@ -34,7 +34,7 @@ def draw_picture(
     q.heading[0], q.speed[0] = view.heading[0], view.speed[0]
     q.status[0], q.pos[0], q.vel[0] = view.status[0], view.pos[0], view.vel[0]
     q.distance[0] = view.distance[0]
-    q.ranged[0] = view.heard[0] + swarm.intake.start_ns * 1e-9
+    q.ranged[0] = view.t_last_range[0] + swarm.intake.start_ns * 1e-9
     q.sigma[0] = largest_std(view.cov[0])
     sound = is_sound(swarm.estimate.cov[0])
     for pair, (i, j) in enumerate(group.pairs.tolist()):

@@ -29,15 +29,15 @@ class SilentCars:
         self._sigma: F64 = np.full((n_slots, n_slots), np.inf)
         self._t = -np.inf
 
-    def note(self, view: AgentView, sigma: F64, heard: Bool) -> None:
+    def note(self, view: AgentView, sigma: F64, recent: Bool) -> None:
         """Store the known positions of cars with recent messages.
 
         Args:
             view: View of one environment.
             sigma: Largest standard deviation of each relative position, (slot, slot) [m].
-            heard: True for cars with recent messages, (slot).
+            recent: True for cars with recent messages, (slot).
         """
-        known = view.ok[0] & np.isfinite(sigma) & heard
+        known = view.ok[0] & np.isfinite(sigma) & recent
         self._pos[known] = view.pos[0][known]
         self._sigma[known] = sigma[known]
 

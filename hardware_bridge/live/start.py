@@ -135,10 +135,10 @@ class Start:
         report, swarm = self._feed.report, group.swarm
         assert report is not None
         ids, wait = swarm.group.ids, f"not well within {self._params.wait:g} s"
-        heard = swarm.heard()
-        silent = [k for k in range(len(heard)) if not np.isfinite(heard[k])]
+        t_last_message = swarm.t_last_message()
+        silent = [k for k in range(len(t_last_message)) if not np.isfinite(t_last_message[k])]
         if silent:
-            return f"node {ids[silent[0]]}: {wait}: it was not heard"
+            return f"node {ids[silent[0]]}: {wait}: no message was received"
         # A healthy car that is not armed waits for another one.
         unwell = [k for k in slots if not report.well_for[k] > swarm.config.safety.health]
         slot = next(iter(unwell), next((k for k in slots if not report.armed[k]), slots[0]))

@@ -130,23 +130,25 @@ class LiveSwarm:
         self.view.now[0] = now
         self._perception.step()
         self.silent.move(self.view, now)
-        self.silent.note(self.view, largest_std(self.view.cov[0]), self._heard_since(t_ns, SILENT))
+        self.silent.note(
+            self.view, largest_std(self.view.cov[0]), self._has_recent_message(t_ns, SILENT)
+        )
 
-    def heard(self, never: float = -np.inf) -> F64:
+    def t_last_message(self, never: float = -np.inf) -> F64:
         """Return the host time of each car's last sample, else of its last message, (slot) [s]."""
-        heard_ns = self.intake.heard_ns
+        received_ns = self.intake.received_ns
         if self.config.tracker.source != "positions":
-            heard_ns = heard_ns | self.intake.sensed_ns
-        return np.array([heard_ns[k] * 1e-9 if k in heard_ns else never for k in self._slots])
+            received_ns = received_ns | self.intake.sensed_ns
+        return np.array([received_ns[k] * 1e-9 if k in received_ns else never for k in self._slots])
 
     @property
     def _slots(self) -> range:
         return range(self.config.n_slots)
 
-    def _heard_since(self, t_ns: int, seconds: float) -> Bool:
+    def _has_recent_message(self, t_ns: int, seconds: float) -> Bool:
         """Return the cars with a message in the last `seconds` before a time, (slot)."""
-        heard_ns, since = self.intake.heard_ns, t_ns - seconds * 1e9
-        return np.array([heard_ns.get(k, -np.inf) >= since for k in self._slots])
+        received_ns, since = self.intake.received_ns, t_ns - seconds * 1e9
+        return np.array([received_ns.get(k, -np.inf) >= since for k in self._slots])
 
     def _make_perception(self) -> Perception | ReadyPerception:
         tracker, group = self.config.tracker, self.group
@@ -173,8 +175,8 @@ class LiveSwarm:
 
     def _let_go(self, t_ns: int, now: float) -> None:
         """Add joining nodes, and nodes that leave by falling silent, to the events."""
-        heard_ns = self.intake.heard_ns
-        recent = {k for k, t in heard_ns.items() if (t_ns - t) * 1e-9 <= GONE}
+        received_ns = self.intake.received_ns
+        recent = {k for k, t in received_ns.items() if (t_ns - t) * 1e-9 <= GONE}
         for node in sorted(recent - self._here):
             self.intake.events.add(now, Kind.JOIN, node, ())
             if node in self._slots:

@@ -48,7 +48,7 @@ class _Pretend:
         pos = [np.array([3.0 * k + math.sin(t + k), math.cos(t * (1 + 0.1 * k)), 0.0])
                for k in range(group.n_nodes)]  # fmt: skip
         for k in range(swarm.config.n_slots):
-            swarm.intake.heard_ns[k] = swarm.intake.sensed_ns[k] = round(t * 1e9)
+            swarm.intake.received_ns[k] = swarm.intake.sensed_ns[k] = round(t * 1e9)
             events.add(t, Kind.MAG, k, (20.0, 0.0, -40.0))
             events.add(t, Kind.IMU, k, (0.0, 0.0, 0.1, 0.3 * math.sin(t), 0.0, GRAVITY))
             pose = PoseReading(UNNAMED, "", pos=tuple(pos[k]), q_wb=(1.0, 0.0, 0.0, 0.0))

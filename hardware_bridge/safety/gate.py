@@ -130,7 +130,7 @@ class Gate:
         picture: Picture,
         now: F64,
         word: F64,
-        heard: F64,
+        t_last_message: F64,
         linked: Bool,
         telemetry: TelemetryState | None = None,
     ) -> GateOutput:
@@ -140,25 +140,25 @@ class Gate:
             picture: Latest snapshot.
             now: Current time, increasing from call to call, (env) [s].
             word: Time of the deciding process's last heartbeat, (env) [s].
-            heard: Time of the last message of each car's node, (env, car) [s].
+            t_last_message: Time of the last message of each car's node, (env, car) [s].
             linked: True if the car's port is open, (env, car).
             telemetry: Telemetry of the cars' controllers; None without telemetry.
         """
         p = self.params
-        telemetry = no_telemetry(heard.shape, p) if telemetry is None else telemetry
-        forward, backward = np.full((2, *heard.shape), p.max_speed)
-        left, right = np.full((2, *heard.shape), p.max_steering)
+        telemetry = no_telemetry(t_last_message.shape, p) if telemetry is None else telemetry
+        forward, backward = np.full((2, *t_last_message.shape), p.max_speed)
+        left, right = np.full((2, *t_last_message.shape), p.max_steering)
         requested = np.nan_to_num(
             picture.requested_speed, nan=0.0, posinf=p.max_speed, neginf=-p.max_speed
         )
         ahead = requested >= 0.0
-        limiting, holding = np.full((2, *heard.shape), NO_REASON)
+        limiting, holding = np.full((2, *t_last_message.shape), NO_REASON)
         # Comparisons with NaN are false; rules are written so that NaN counts as a fault.
         with np.errstate(invalid="ignore", over="ignore"):
             for k, rule in enumerate(RULES):
                 verdict = rule.check(
                     Moment(
-                        picture, now, word, heard, linked,
+                        picture, now, word, t_last_message, linked,
                         self.armed, self._recent, telemetry, self._slow[k],
                     ), p
                 )  # fmt: skip

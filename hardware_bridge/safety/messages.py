@@ -24,7 +24,7 @@ class Word:
 
     t: float
     """[s] Time of the heartbeat."""
-    heard: F64
+    t_last_message: F64
     """Time of the last message of each car's node, (car) [s]."""
 
 
@@ -104,8 +104,8 @@ ROWS = 7
 def pack(message: Message) -> bytes:
     """Return the bytes of a message."""
     match message:
-        case Word(t, heard):
-            return b"W" + _TIME.pack(t) + heard.tobytes()
+        case Word(t, t_last_message):
+            return b"W" + _TIME.pack(t) + t_last_message.tobytes()
         case Decision(picture):
             return b"D" + picture.to_bytes()
         case Order(what):

@@ -22,7 +22,7 @@ class Moment(NamedTuple):
     """Current time, (env) [s]."""
     word: F64
     """Time of the deciding process's last heartbeat, (env) [s]."""
-    heard: F64
+    t_last_message: F64
     """Time of the last message of each car's node, (env, car) [s]."""
     linked: Bool
     """True if the car's own port is open, (env, car)."""

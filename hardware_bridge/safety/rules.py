@@ -86,7 +86,7 @@ def absent(m: Moment, p: SafetyParams) -> Verdict:
 
 def stale(m: Moment, p: SafetyParams) -> Verdict:
     """The last message of the car's node or the latest estimates are too old."""
-    times = (m.now[:, None] - m.heard, (m.now - m.picture.t)[:, None])
+    times = (m.now[:, None] - m.t_last_message, (m.now - m.picture.t)[:, None])
     old = ~(_within(times[0], p.stale_stop) & _within(times[1], p.stale_stop))
     older = ~(_within(times[0], p.stale_slow) & _within(times[1], p.stale_slow))
     return _capped(np.where(old, 0.0, np.where(older, p.slow, FREE)), old)
@@ -175,7 +175,7 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
 def fence(m: Moment, p: SafetyParams) -> Verdict:
     """The fence is nearer than the car needs to stop, or the car's position in it is not known."""
     if p.fence is None:
-        return _capped(np.full(m.heard.shape, FREE), _never(m))
+        return _capped(np.full(m.t_last_message.shape, FREE), _never(m))
     q = m.picture
     placed = (q.placed == 1.0) & np.isfinite(q.place).all(axis=-1) & (q.place_sigma >= 0)
     corners = np.array(p.fence.corners)
@@ -224,7 +224,7 @@ def _held(hold: Bool) -> Verdict:
 
 
 def _never(m: Moment) -> Bool:
-    return np.zeros(m.heard.shape, dtype=bool)
+    return np.zeros(m.t_last_message.shape, dtype=bool)
 
 
 RULES = (
@@ -249,7 +249,7 @@ RULES = (
     ),
     Rule("absent", absent, "it takes no part", "stops for good"),
     Rule(
-        "stale", stale, "its node was not heard, or nothing was estimated",
+        "stale", stale, "no message from its node, or no estimate",
         "`slow` after `stale_slow`, stops for good after `stale_stop`",
     ),
     Rule("covariance", covariance, "a covariance is not positive definite", "stops for good"),

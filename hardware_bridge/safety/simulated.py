@@ -63,12 +63,12 @@ class SimulatedGate:
             q.present[:], q.oriented[:] = here.present, here.oriented
             q.heading[:], q.speed[:] = here.heading, here.speed
             q.status[:], q.pos[:], q.vel[:] = here.status, here.pos, here.vel
-            q.distance[:], q.ranged[:] = here.distance, here.heard
+            q.distance[:], q.ranged[:] = here.distance, here.t_last_range
             q.sigma[:] = largest_std(here.cov)
             q.sound[:] = np.isfinite(q.sigma)
             everyone = np.ones((1, speed.shape[1]), dtype=bool)
-            heard = np.repeat(now[:, None], speed.shape[1], axis=1)
-            out = gate.step(q, now, now, heard, everyone)
+            t_last_message = np.repeat(now[:, None], speed.shape[1], axis=1)
+            out = gate.step(q, now, now, t_last_message, everyone)
             gate.arm(now, here.present)
             self._speed[env], self._steering[env] = out.speed[0], out.steering[0]
             self._stopped[env], self._reason[env] = ~out.armed[0], out.reason[0]

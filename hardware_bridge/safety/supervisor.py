@@ -63,7 +63,7 @@ class Supervisor:
         self._drivers, self._names, self._believed = dict(drivers), dict(names), dict(believed)
         self._picture: Picture = blank_picture(1, n_cars)
         self._word = np.full(1, -np.inf)
-        self._heard: F64 = np.full((1, n_cars), -np.inf)
+        self._t_last_message: F64 = np.full((1, n_cars), -np.inf)
         self._linked: Bool = np.zeros((1, n_cars), dtype=bool)
         self._now = np.full(1, -np.inf)
         self._output: GateOutput | None = None
@@ -85,8 +85,8 @@ class Supervisor:
     def take(self, message: Message) -> list[Notice]:
         """Process a message of the deciding process; return notices for the user."""
         match message:
-            case Word(t, heard):
-                self._word[0], self._heard[0] = t, heard
+            case Word(t, t_last_message):
+                self._word[0], self._t_last_message[0] = t, t_last_message
             case Decision(picture):
                 # Outdated snapshots and those without a valid time are ignored.
                 if picture.t[0] >= self._picture.t[0]:
@@ -109,7 +109,7 @@ class Supervisor:
                 return [Notice(f"unknown order {what!r}")]
         return []
 
-    def hear(self, slot: int, data: bytes, now: float) -> None:
+    def receive(self, slot: int, data: bytes, now: float) -> None:
         """Process bytes that a car's controller sent at time `now` [s]."""
         readings: Iterable[Reading] = self._drivers[slot].telemetry.feed(data)
         if slot in self._believed:
@@ -155,7 +155,7 @@ class Supervisor:
             now, self._gate.recent, self._gate.armed[0], self._linked[0]
         )
         out = self._gate.step(
-            self._picture, self._now, self._word, self._heard, self._linked, telemetry
+            self._picture, self._now, self._word, self._t_last_message, self._linked, telemetry
         )
         self._output = out
         said = {

@@ -108,7 +108,7 @@ class _Watch:
             left = deadline - time.monotonic_ns()
             for chunk in self._links.wait(max(left, 0) * 1e-9):
                 slot = self._slots[chunk.link]
-                self._supervisor.hear(slot, chunk.data, chunk.t_ns * 1e-9)
+                self._supervisor.receive(slot, chunk.data, chunk.t_ns * 1e-9)
                 self._say([Telemetry(self._slots[chunk.link], chunk.t_ns, chunk.data)])
             decided = self._listen()
             now = time.monotonic_ns()

@@ -23,7 +23,7 @@ HEADER = Path(__file__).with_name("relpos_wire.h")
 
 def c_header() -> str:
     """Return the text of the header."""
-    spoken = [message for message in MESSAGES if message.fields]
+    with_fields = [message for message in MESSAGES if message.fields]
     parts = {
         "VERSION": str(wire.VERSION),
         "HOST": str(wire.HOST),
@@ -32,9 +32,9 @@ def c_header() -> str:
         "HEADER_BYTES": str(wire.HEADER_BYTES),
         "FLAG_MAC": str(wire.FLAG_MAC),
         "MESSAGES": "".join(map(_types, MESSAGES)),
-        "UNION": "".join(f"        relpos_{m.name} {m.name};\n" for m in spoken),
+        "UNION": "".join(f"        relpos_{m.name} {m.name};\n" for m in with_fields),
         "CRC_TABLE": _crc_table(),
-        "CODE": "".join(_code(message) for message in spoken),
+        "CODE": "".join(_code(message) for message in with_fields),
         "PACK": "".join(map(_pack_case, MESSAGES)),
         "UNPACK": "".join(map(_unpack_case, MESSAGES)),
     }

@@ -25,7 +25,7 @@ from hardware_bridge.wire import definition as wire
 from hardware_bridge.wire.definition import Message
 
 Row: TypeAlias = Sequence[float]
-Spoken: TypeAlias = tuple[Message, tuple[float, ...]]
+WireMessage: TypeAlias = tuple[Message, tuple[float, ...]]
 
 made: Callable[[type, tuple[Any, ...]], Any] = tuple.__new__
 """Build a reading from all its fields, a third faster than by its class; for frequent types."""
@@ -71,43 +71,43 @@ def is_unit(q: Sequence[float]) -> bool:
     return abs(math.sqrt(sum(x * x for x in q)) - 1.0) <= UNIT_WITHIN
 
 
-def _of_imu(r: ImuReading) -> Spoken:
+def _of_imu(r: ImuReading) -> WireMessage:
     if r.mag is None:
         return wire.IMU, (*r.gyr, *r.acc)
     return wire.IMU_MAG, (*r.gyr, *r.acc, *r.mag)
 
 
-def _of_state(r: StateReading) -> Spoken:
+def _of_state(r: StateReading) -> WireMessage:
     if not is_unit(r.q_wb):
         raise ValueError(f"q_wb: expected a unit quaternion, got {r.q_wb}")
     return wire.STATE, (*r.q_wb, *r.accel_w)
 
 
-def _of_range(r: RangeReading) -> Spoken:
+def _of_range(r: RangeReading) -> WireMessage:
     has = (r.nearer is not None) | (r.rx_power is not None) << 1 | (r.fp_power is not None) << 2
     nearer = 0 if r.nearer is None else node_number("nearer", r.nearer)
     to = node_number("to", r.to)
     return wire.RANGES, (to, nearer, r.distance, r.rx_power or 0.0, r.fp_power or 0.0, 0.0, has)
 
 
-def _of_motion(r: MotionReading) -> Spoken:
+def _of_motion(r: MotionReading) -> WireMessage:
     return wire.MOTION, (r.speed, r.steering or 0.0, r.steering is not None)
 
 
-def _of_near(r: NearReading) -> Spoken:
+def _of_near(r: NearReading) -> WireMessage:
     bearing = math.remainder(r.bearing, 2.0 * math.pi)
     return wire.NEAR, (bearing, r.distance or 0.0, r.distance is not None)
 
 
-def _of_status(r: StatusReading) -> Spoken:
+def _of_status(r: StatusReading) -> WireMessage:
     return wire.STATUS, (word("fault", r.fault), r.voltage or 0.0, r.voltage is not None)
 
 
-def _of_drive(r: DriveReading) -> Spoken:
+def _of_drive(r: DriveReading) -> WireMessage:
     return wire.COMMAND, (node_number("to", r.to), r.speed, r.steering, r.brake)
 
 
-_OF: dict[type, Callable[[Any], Spoken]] = {
+_OF: dict[type, Callable[[Any], WireMessage]] = {
     ImuReading: _of_imu,
     StateReading: _of_state,
     RangeReading: _of_range,
@@ -121,7 +121,7 @@ _OF: dict[type, Callable[[Any], Spoken]] = {
 }
 
 
-def message_of(reading: Reading) -> Spoken:
+def message_of(reading: Reading) -> WireMessage:
     """Return message and values of a reading; for a message with rows, one row.
 
     Raises:

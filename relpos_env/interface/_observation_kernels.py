@@ -142,7 +142,7 @@ def observe_ranges(view, out):
                 if b == a:
                     continue
                 o = b if b < a else b - 1
-                age = view.now[e] - view.heard[e, a, b]
+                age = view.now[e] - view.t_last_range[e, a, b]
                 fresh = age <= OLD
                 out[e, a, o] = 1.0 if fresh else 0.0
                 put(out, e, a, others + o, view.distance[e, a, b] if fresh else 0.0, FAR)

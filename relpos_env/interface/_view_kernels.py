@@ -85,14 +85,14 @@ def see_truth(pos, vel, heading, view):
 @kernel
 def note_ranges(t, kind, i, j, values, has_power, valid, view):
     """Store the last range of every pair of cars; arguments as in `MeasurementBlock`."""
-    n_cars = view.heard.shape[1]
+    n_cars = view.t_last_range.shape[1]
     for e in range(t.shape[0]):
         for k in range(t.shape[1]):
             if not valid[e, k] or kind[e, k] != RANGE or max(i[e, k], j[e, k]) >= n_cars:
                 continue
             for a, b in ((i[e, k], j[e, k]), (j[e, k], i[e, k])):
-                if t[e, k] >= view.heard[e, a, b]:
-                    view.heard[e, a, b] = t[e, k]
+                if t[e, k] >= view.t_last_range[e, a, b]:
+                    view.t_last_range[e, a, b] = t[e, k]
                     view.distance[e, a, b] = values[e, k, 0]
                     power = values[e, k, 1] - values[e, k, 2] if has_power[e, k] else 0.0
                     view.gap[e, a, b] = power
@@ -101,8 +101,8 @@ def note_ranges(t, kind, i, j, values, has_power, valid, view):
 @kernel
 def forget_all(view, e):
     """Clear the ranges of an environment."""
-    for a in range(view.heard.shape[1]):
-        for b in range(view.heard.shape[1]):
-            view.heard[e, a, b] = -np.inf
+    for a in range(view.t_last_range.shape[1]):
+        for b in range(view.t_last_range.shape[1]):
+            view.t_last_range[e, a, b] = -np.inf
             view.distance[e, a, b] = 0.0
             view.gap[e, a, b] = 0.0

@@ -41,7 +41,7 @@ class AgentView(NamedTuple):
     """True where the heading is known, (env, car)."""
     distance: F64
     """Last raw range of the pair, (env, car, other) [m]; 0 before the first."""
-    heard: F64
+    t_last_range: F64
     """Time of the last range, (env, car, other) [s]; -inf before the first."""
     gap: F64
     """Total minus first-path received power of the last range, (env, car, other) [dB]."""
@@ -82,7 +82,7 @@ def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> AgentView:
         heading=np.zeros(own),
         oriented=np.zeros(own, dtype=bool),
         distance=np.zeros(other),
-        heard=np.full(other, -np.inf),
+        t_last_range=np.full(other, -np.inf),
         gap=np.zeros(other),
         target=np.zeros((*other, 2)),
         has_target=np.zeros(other, dtype=bool),

@@ -116,5 +116,5 @@ class Film:
         i, j = swarm.constellation.pairs.T
         sight = swarm.line_of_sight(env)[i, j]
         kind = np.where(sight, LINE_OF_SIGHT, NO_LINE_OF_SIGHT)
-        kind[view.now[env] - view.heard[env, i, j] > SILENT] = NO_RANGE
+        kind[view.now[env] - view.t_last_range[env, i, j] > SILENT] = NO_RANGE
         return np.column_stack([i, j, kind])

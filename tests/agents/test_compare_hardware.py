@@ -180,7 +180,7 @@ def test_cars_that_were_stopped_are_told_of():
             bridge.rig.emulator.nodes[0].node.be_silent(16.6)
 
     result = run(bridge, seconds=12.0, attend=attend)
-    assert result.remarks == ("cars.1 stopped: its node was not heard, or nothing was estimated",)
+    assert result.remarks == ("cars.1 stopped: no message from its node, or no estimate",)
 
 
 def test_drivers_with_beams_and_none_at_all_are_refused(monkeypatch):

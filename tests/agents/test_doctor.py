@@ -96,7 +96,7 @@ def test_formats_are_ready_before_anybody_listens():
 def test_a_good_link():
     report = diagnose(GOOD)
     assert report.ok
-    assert report.speaks == "alpha"
+    assert report.detected_format == "alpha"
     assert report.frames_hz == 200.0
     (node,) = report.nodes
     assert (node.node, node.imu_hz, node.ranges_hz) == ("1", 100.0, {"2": 100.0})
@@ -110,7 +110,7 @@ def problem(*args, **options):
 
 def test_another_format_is_recognised():
     said = problem(GOOD, format="beta")
-    assert said.startswith('speaks alpha, configured beta: set format = "alpha"')
+    assert said.startswith('sends alpha, configured beta: set format = "alpha"')
 
 
 def test_the_rate_seems_wrong():
@@ -228,12 +228,12 @@ def test_listens_to_links_and_cars_and_writes_nothing(talkers):
     assert by_name["links.left"].ok
     assert by_name["links.left"].frames_hz > 5.0
     assert by_name["links.right"].problems == [
-        "node 1 speaks on links.left too: give the devices ids of their own, or correct `ids` and "
+        "node 1 sends on links.left too: give the devices ids of their own, or correct `ids` and "
         "`node` of the two links"
     ]
     assert by_name["links.third"].problems[0].startswith("no port /dev/none: plug it in")
     assert by_name["cars.1"].ok
-    assert by_name["cars.2"].problems[0].startswith("speaks beta, which is no car")
+    assert by_name["cars.2"].problems[0].startswith("sends beta, which is no car")
     assert not found.ok
     for talker in (left, right, motor, wrong):
         assert talker.heard() == b""
@@ -356,7 +356,7 @@ def test_command_with_a_configuration(adapters, talkers, tmp_path):
     done = run("--config", path, "--seconds", 0.5)
     assert done.exit_code == 2, done.output
     assert "node 1: range to 2" in done.stdout
-    assert "speaks dw1000, configured linktrack" in done.stdout
+    assert "sends dw1000, configured linktrack" in done.stdout
     assert done.stdout.rstrip().endswith("1 to mend")
     path.write_text(SWARM.format(**ports).replace('linktrack"\nnode', 'dw1000"\nnode'))
     done = run("--config", path, "--seconds", 0.5, "--json")

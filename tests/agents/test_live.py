@@ -162,7 +162,7 @@ def test_what_is_known_at_one_moment(snapshots):
     assert [n.node for n in last.nodes] == [1, 2, 3]
     assert all(n.imu_hz == pytest.approx(100.0, abs=5.0) for n in last.nodes)
     assert all(n.range_hz > 20.0 for n in last.nodes)
-    assert all(n.heard_ago < 0.2 for n in last.nodes)
+    assert all(n.message_age < 0.2 for n in last.nodes)
     carried = result.estimate.at(result.t_ns * 1e-9 - result.recording.header.monotonic_ns * 1e-9)
     for p, pair in enumerate(last.pairs):
         np.testing.assert_allclose(pair.pos_w, carried.pos_ij_w[-1, p], atol=1e-12)
@@ -183,14 +183,14 @@ def test_what_is_shown(snapshots, monkeypatch):
     assert [row[0] for row in node_rows(taken[-1])] == ["1", "2", "3"]
     assert [len(row) for row in pair_rows(taken[-1])] == [len(pair_header(taken[-1]))] * 3
     assert pair_rows(taken[0])[0][1:4] == ["-", "-", "-"]
-    assert "3 of 3 nodes heard" in line(taken[-1])
+    assert "3 of 3 nodes active" in line(taken[-1])
     out = io.StringIO()
     console = Console(file=out, force_terminal=True, width=120)
     monkeypatch.setattr("rich.live.get_console", lambda: console)
     with LiveTable("three [cars]") as screen:
         screen.show(monitor, [(1.0, "links.n1 down: [unplugged]")])
     shown = out.getvalue()
-    for text in ("three [cars]", "links.n1 down: [unplugged]", "1-2", "NLOS", "heard ago"):
+    for text in ("three [cars]", "links.n1 down: [unplugged]", "1-2", "NLOS", "last message"):
         assert text in shown
 
 

@@ -71,7 +71,7 @@ def test_what_is_compiled_first_does_not_count_as_listening(talker):
 
 
 def test_another_format_than_asked_for(talker):
-    with pytest.raises(BridgeError, match="speaks beta, not alpha: use --format beta"):
+    with pytest.raises(BridgeError, match="sends beta, not alpha: use --format beta"):
         sniff(talker.path, format="alpha", seconds=0.5, formats=FORMATS)
 
 
@@ -138,7 +138,7 @@ def test_command_json(talker, formats):
 
 def test_command_table_and_raw(talker, formats):
     done = CliRunner().invoke(cli, ["sniff", talker.path, "--seconds", "0.4"])
-    assert "speaks beta" in done.stdout.splitlines()[-1]
+    assert "sends beta" in done.stdout.splitlines()[-1]
     assert "range" in done.stdout
     done = CliRunner().invoke(cli, ["sniff", talker.path, "--seconds", "0.4", "--raw"])
     assert b"beta".hex(" ") in done.stdout

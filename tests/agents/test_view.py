@@ -20,7 +20,9 @@ def pair(i, j, pos, status="ok", nlos=0.0):
 
 
 def node(k, heard=0.1):
-    return NodeRow(node=k, heard_ago=heard, imu_hz=100.0, range_hz=50.0, voltage=None, heading=0.5)
+    return NodeRow(
+        node=k, message_age=heard, imu_hz=100.0, range_hz=50.0, voltage=None, heading=0.5
+    )
 
 
 SNAPSHOT = Snapshot(

@@ -34,7 +34,7 @@ def picture(n_envs=1, n_cars=2, *, t=0.0, sigma=0.05, spacing=3.0) -> Picture:
     return q
 
 
-def check(name, q, params=None, *, now=0.0, word=0.0, heard=0.0, was_slow=False, **other):
+def check(name, q, params=None, *, now=0.0, word=0.0, t_last_message=0.0, was_slow=False, **other):
     """Return the verdict of one rule."""
     shape = q.heading.shape
     rule = next(rule for rule in RULES if rule.name == name)
@@ -46,7 +46,7 @@ def check(name, q, params=None, *, now=0.0, word=0.0, heard=0.0, was_slow=False,
         **other,
     }
     moment = Moment(
-        q, np.full(shape[0], now), np.full(shape[0], word), np.full(shape, heard),
+        q, np.full(shape[0], now), np.full(shape[0], word), np.full(shape, t_last_message),
         was_slow=np.full(shape, was_slow), **fields,
     )  # fmt: skip
     with np.errstate(invalid="ignore", over="ignore"):

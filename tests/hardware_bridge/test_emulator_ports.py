@@ -57,12 +57,12 @@ def test_every_byte_goes_through_both_ways(port):
     finally:
         os.close(host)
     assert port.counts.written == port.counts.read == len(everything)
-    assert port.counts.dropped == port.counts.unheard == 0
+    assert port.counts.dropped == port.counts.unread == 0
 
 
 def test_what_nobody_hears_is_lost(port):
     port.write(b"before")
-    assert port.counts.unheard == 6
+    assert port.counts.unread == 6
     host = open_host(port.link)
     try:
         port.write(b"after")
@@ -95,7 +95,7 @@ def test_unplugged_it_is_gone_and_comes_back_under_its_name(port):
             assert os.read(host, 10) == b""
         port.write(b"nobody")
         assert port.read() == b""
-        assert port.counts.unheard == 6
+        assert port.counts.unread == 6
     finally:
         os.close(host)
     port.replug()

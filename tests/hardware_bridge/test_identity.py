@@ -204,7 +204,7 @@ def test_spoofed_boots_fill_no_memory_and_are_quarantined():
     slowly = Identities()
     for k in range(1000):
         slowly.check("a", numbered(rng.getrandbits(32), 0), k * 2 * S, 3)
-    assert len(slowly._nodes[3].boots._heard) <= 64
+    assert len(slowly._nodes[3].boots._boots) <= 64
     assert len(slowly.notices) <= 256
 
 

@@ -257,4 +257,4 @@ def test_a_line_may_hold_more_than_is_read():
     more = line(node=1, pos=[1.0, 2.0, 3.0], header={"seq": 4})
     torn = b'{"node": 2, "pos": [1.0, ' + line(node=2, pos=[4.0, 5.0, 6.0])
     swarm.take(Chunk("links.mocap", S, more + torn))
-    assert sorted(swarm.intake.heard_ns) == [0, 1]
+    assert sorted(swarm.intake.received_ns) == [0, 1]

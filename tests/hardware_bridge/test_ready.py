@@ -203,8 +203,8 @@ def test_a_position_is_a_distance_for_whoever_sees_ranges():
     watcher.pair(0.3, 0, 1, (3.0, 4.0, 0.0), vel=(0.0, 0.0, 0.0))
     view = watcher.see(0.35)
     assert view.distance[0, 0, 1] == view.distance[0, 1, 0] == 5.0
-    assert view.heard[0, 0, 1] == pytest.approx(0.3)
-    assert view.heard[0, 0, 2] == -np.inf
+    assert view.t_last_range[0, 0, 1] == pytest.approx(0.3)
+    assert view.t_last_range[0, 0, 2] == -np.inf
 
 
 def twin(pending, q, var, first_var):

@@ -45,7 +45,7 @@ class RunningRig:
     @property
     def heard(self):
         """True if any car received a byte."""
-        return any(car.heard for car in self.rig.emulator.cars)
+        return any(car.received_any for car in self.rig.emulator.cars)
 
     def close(self):
         self._ends.set()
@@ -171,7 +171,7 @@ WRONG = {
     ),
     "a node for messages that are signed": (
         lambda t: t.replace(N1, N1 + f'\nkey = "{KEY}"\nnode = 1', 1), "links.n1.node",
-        "say who speaks",
+        "name their sender",
     ),
     "VESC that is never fast enough": (
         lambda t: t.replace(
@@ -247,7 +247,9 @@ def test_stream_that_says_nothing_that_can_be_read(change, advice, tmp_path, mon
     own = RunningRig(tmp_path / "rig")
     try:
         path = written(tmp_path, own, change)
-        with pytest.raises(BridgeError, match=r"node 1: not well within 3 s: it was not heard"):
+        with pytest.raises(
+            BridgeError, match=r"node 1: not well within 3 s: no message was received"
+        ):
             drive(config=path, arm=True, seconds=2.0, wait=3.0)
         # The ports of cars were opened, and the cars received stop commands.
         assert not own.moved
@@ -282,7 +284,9 @@ def test_wrong_baud_rate(tmp_path):
         path = written(
             tmp_path, own, lambda t: t.replace(str(tmp_path / "rig" / "n1"), str(noise.path))
         )
-        with pytest.raises(BridgeError, match=r"node 1: not well within 3 s: it was not heard"):
+        with pytest.raises(
+            BridgeError, match=r"node 1: not well within 3 s: no message was received"
+        ):
             drive(config=path, arm=True, seconds=2.0, wait=3.0)
         assert not own.moved
     finally:

@@ -18,7 +18,7 @@ from hardware_bridge.readings import MICROSECONDS_32, ImuReading, OperatorReadin
 from hardware_bridge.wire.encoder import RelposEncoder
 
 pytestmark = pytest.mark.slow
-SILENT = "stopped: its node was not heard, or nothing was estimated"
+SILENT = "stopped: no message from its node, or no estimate"
 KEY = bytes(range(16))
 CAR_LENGTH = 0.42
 """[m] Length of a car."""

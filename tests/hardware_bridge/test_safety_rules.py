@@ -27,7 +27,7 @@ def test_silence(age, hold):
 @pytest.mark.parametrize("t", NO_TIMES)
 def test_no_times_are_unwell(t):
     assert caps(check("silence", picture(), word=t)) == (0.0, True)
-    assert caps(check("stale", picture(), heard=t)) == (0.0, True)
+    assert caps(check("stale", picture(), t_last_message=t)) == (0.0, True)
     assert caps(check("stale", picture(t=t))) == (0.0, True)
     q = picture()
     q.status[:], q.ranged[:] = Status.STARTING, t
@@ -38,7 +38,7 @@ def test_no_times_are_unwell(t):
     (0.15, FREE, False), (0.1501, P.slow, False), (0.3, P.slow, False), (0.3001, 0.0, True),
 ])  # fmt: skip
 def test_stale(age, cap, hold):
-    assert caps(check("stale", picture(), heard=-age)) == (cap, hold)
+    assert caps(check("stale", picture(), t_last_message=-age)) == (cap, hold)
     assert caps(check("stale", picture(t=-age))) == (cap, hold)
 
 

@@ -87,7 +87,7 @@ class Telling(Drive):
     def say(self, *readings, n=1):
         for _ in range(n):
             self.drivers[0].readings = list(readings)
-            self.supervisor.hear(0, b"", self.now)
+            self.supervisor.receive(0, b"", self.now)
             sent = self.tick()
         return sent
 
@@ -254,7 +254,7 @@ def test_the_gate_knows_where_a_car_is_that_has_fallen_silent():
         env.step(stand)
     assert swarm.view.ok[0, :2, 2].all()
     before = swarm.view.pos[0, :2, 2].copy()
-    heard = swarm.intake.heard_ns
+    heard = swarm.intake.received_ns
 
     class Silenced(dict):
         """Reception times without those of node 2."""
@@ -263,7 +263,7 @@ def test_the_gate_knows_where_a_car_is_that_has_fallen_silent():
             if node != 2:
                 super().__setitem__(node, t_ns)
 
-    swarm.intake.heard_ns = Silenced(heard)
+    swarm.intake.received_ns = Silenced(heard)
     take = swarm.intake.events.add_range
     swarm.intake.events.add_range = lambda t, pair, *rest: 2 in pair or take(t, pair, *rest)
     for _ in range(60):

@@ -97,7 +97,7 @@ def test_beams_are_those_of_sensors_on_the_body():
     assert beams[1] == pytest.approx(expected, abs=0.03)
     assert not beams[0].any()  # the scanner is on the other car
     assert not swarm.intake.near.beams(1001 + round(LASTS * 1e9)).any()
-    assert not swarm.intake.heard_ns  # a scanner does not report the position of its car
+    assert not swarm.intake.received_ns  # a scanner does not report the position of its car
 
 
 def test_it_is_asked_whenever_its_port_comes_up(tmp_path):
@@ -168,7 +168,7 @@ HERE = "node = 2\n"
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (HERE, "", "links.scanner.node: missing: rplidar does not say who speaks"),
+        (HERE, "", "links.scanner.node: missing: rplidar does not name the sender"),
         (HERE, HERE + "scanner.hight = 1.0\n", "links.scanner.scanner.hight: unknown"),
         (HERE, HERE + "scanner.width = 0.0\n", "scanner.width: expected 0.01 to 5 m, got 0"),
         (HERE, HERE + "scanner.x = 50.0\n", "scanner.x: expected -0.42 to 0.42 m, got 50"),

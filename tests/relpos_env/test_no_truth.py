@@ -57,7 +57,7 @@ def test_before_the_first_ranges_nobody_is_seen(name):
     view = env.loop.view
     for array in (view.ok, view.status, view.distance, view.pos):
         array[:] = 0
-    view.heard[:] = -np.inf
+    view.t_last_range[:] = -np.inf
     env.formation._observe(slice(0, 1))
     n_masked = env.fields[0].size
     assert env.fields[0].name == "mask"

@@ -56,7 +56,7 @@ def random_view(seed, far=1.0):
     view.speed[:] = far * rng.normal(0.0, 1.0, view.speed.shape)
     view.steering[:] = rng.uniform(-0.4, 0.4, view.steering.shape)
     view.distance[:] = far * rng.uniform(-0.2, 9.0, view.distance.shape)
-    view.heard[:] = view.now[:, None, None] - rng.uniform(0.0, 15.0, view.heard.shape)
+    view.t_last_range[:] = view.now[:, None, None] - rng.uniform(0.0, 15.0, view.t_last_range.shape)
     view.gap[:] = far * rng.normal(8.0, 4.0, view.gap.shape)
     for k in range(N):
         view.has_target[:, k, k] = False
@@ -97,7 +97,7 @@ def twin(name, view, e, a):
     """Return the observation of a car as documented: field to numbers."""
     others = [b for b in range(N) if b != a]
     ok = view.ok[e, a, others].astype(float)
-    age = view.now[e] - view.heard[e, a, others]
+    age = view.now[e] - view.t_last_range[e, a, others]
     fresh = (age <= 10.0).astype(float)
     c, s = np.cos(view.heading[e, a]), np.sin(view.heading[e, a])
     std = []

@@ -46,7 +46,7 @@ def state(session):
     if session is None:
         return None
     turns = session._turns
-    times = turns.expected, turns.deadline, turns.check_at, turns.heard_at
+    times = turns.expected, turns.deadline, turns.check_at, turns.received_at
     return (
         session.role.value, session.root, session.round, session.members, turns.cursor,
         session._dice._state, *(t % MODULUS for t in times),
@@ -59,7 +59,7 @@ def twin_state(radio, env, node):
     if not radio._air.nodes[env, node]["on"]:
         return None
     members = tuple(k for k in range(radio._air.sessions.shape[1]) if s["members"] >> k & 1)
-    times = (s[k] % MODULUS for k in ("expected", "deadline", "check_at", "heard_at"))
+    times = (s[k] % MODULUS for k in ("expected", "deadline", "check_at", "received_at"))
     return (ROLES[s["role"]], s["root"], s["round"], members, s["cursor"], s["dice"], *times)
 
 

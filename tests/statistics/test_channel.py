@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from relpos_env.sensors.radio._air_kernels import hear_message, make_nodes, next_window
+from relpos_env.sensors.radio._air_kernels import make_nodes, next_window, receive_message
 from relpos_env.sensors.radio._air_state import LATENT, NODE, RECEPTION, make_channel
 from relpos_env.sensors.radio._channel_kernels import KNOT
 from relpos_env.sensors.radio._occlusion_kernels import crosses_box, crosses_capsule
@@ -96,7 +96,7 @@ class Line:
         """Return the reception by r of a message of s at a time in the window, None if lost."""
         boxes = np.array(boxes, dtype=np.float64).reshape(-1, 6)
         capsules = np.array(capsules, dtype=np.float64).reshape(-1, 7)
-        heard = hear_message(
+        heard = receive_message(
             self.channel, self.latents, self.seed, self.nodes, s, r, t,
             (self.pos, self.pos, self.dt), boxes, capsules, self.heard,
         )  # fmt: skip

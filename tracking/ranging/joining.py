@@ -29,7 +29,7 @@ class Joining:
         self.succeeded()
         self._tried = None
 
-    def speaks(self, round: int) -> bool:
+    def may_transmit(self, round: int) -> bool:
         """Return whether to transmit in the gap that begins: once a round, after the backoff."""
         if round == self._tried:
             return False

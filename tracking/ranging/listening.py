@@ -20,18 +20,18 @@ class Listener:
         self._id = node_id
         self.peers = Peers()
         self._exchanges = Exchanges(params)
-        self._spoken: int | None = None
+        self._last_sent: int | None = None
 
     def forget(self) -> None:
         """Reset, after a jump of the own clock or a reset of the node."""
         self.peers.forget()
         self._exchanges.forget()
-        self._spoken = None
+        self._last_sent = None
 
-    def spoken(self, sent: int) -> None:
+    def note_sent(self, sent: int) -> None:
         """Record the transmit time of the own message, own clock."""
-        self._spoken = sent
-        self.peers.spoken()
+        self._last_sent = sent
+        self.peers.begin_table()
 
     def take(self, frame: Frame, reception: Reception, arrived: int) -> list[RangeEvent] | None:
         """Process a message that arrived at a time of the own clock.
@@ -59,10 +59,10 @@ class Listener:
             return None
         when, received = arrived - ago, src.sent - ago
         if row.id == self._id:
-            sent = local = self._spoken or 0
+            sent = local = self._last_sent or 0
         else:
             self.peers.report(row.id, when)
-            sent, local = self.peers[row.id].sent, self.peers[row.id].heard
+            sent, local = self.peers[row.id].sent, self.peers[row.id].received
         if not local or not self.peers.same(when, local, ago):
             return None  # not of the last message received here
         passage = Passage(sent, received, local)

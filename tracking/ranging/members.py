@@ -29,19 +29,19 @@ class Members:
         """Return all members except this node."""
         return tuple(k for k in self.ids if k != self._id)
 
-    def read(self, heard: Frame) -> tuple[int, ...] | None:
+    def read(self, frame: Frame) -> tuple[int, ...] | None:
         """Return the members in a request or reply; None until all parts of its table arrived."""
-        ids = [e.id for e in heard.entries]
-        if heard.part == 0:
+        ids = [e.id for e in frame.entries]
+        if frame.part == 0:
             self._rows = ids
-        elif self._source == (heard.src, heard.round, heard.part - 1):
+        elif self._source == (frame.src, frame.round, frame.part - 1):
             self._rows = self._rows + ids
         else:
             return None
-        self._source = heard.src, heard.round, heard.part
-        if heard.part + 1 < heard.parts or len(self._rows) < heard.n - 1:
+        self._source = frame.src, frame.round, frame.part
+        if frame.part + 1 < frame.parts or len(self._rows) < frame.n - 1:
             return None
-        return tuple(sorted({*self._rows[: heard.n - 1], heard.src}))
+        return tuple(sorted({*self._rows[: frame.n - 1], frame.src}))
 
     def ask_first(self, now: int) -> None:
         """Start as initiator: all members count as present."""

@@ -28,7 +28,7 @@ class Peer:
     boot: int = 0
     sent: int = 0
     """Transmit time, the peer's clock without wraps."""
-    heard: int = 0
+    received: int = 0
     """Receive time, own clock without wraps; 0 if only others have received this peer."""
     reported: int = 0
     """Transmit time of its last message that any other node received, own clock."""
@@ -73,16 +73,16 @@ class Peers:
         peer = self._peers.setdefault(frame.src, Peer())
         peer.doubt = DOUBT if peer.silences else max(peer.doubt - 1, 0)
         peer.silences = 0
-        if peer.heard and peer.boot == frame.boot:
-            own = arrived - peer.heard
+        if peer.received and peer.boot == frame.boot:
+            own = arrived - peer.received
             sent = unwrap(frame.stamp, peer.sent + own)
             if own > 0 and self.same(sent - peer.sent, own, own):
-                peer.sent, peer.heard, peer.misfits = sent, arrived, 0
+                peer.sent, peer.received, peer.misfits = sent, arrived, 0
                 return True
             peer.misfits += 1
             if peer.misfits < PATIENCE:
                 return None
-        peer.boot, peer.sent, peer.heard, peer.misfits = frame.boot, frame.stamp, arrived, 0
+        peer.boot, peer.sent, peer.received, peer.misfits = frame.boot, frame.stamp, arrived, 0
         return False
 
     def report(self, node: int, when: int) -> None:
@@ -98,7 +98,7 @@ class Peers:
     def hidden(self, node: int, since: int) -> bool:
         """Return whether others receive a node whose last message was missed here."""
         peer = self._peers.get(node)
-        return peer is not None and peer.reported > max(peer.heard + ELSEWHERE, since)
+        return peer is not None and peer.reported > max(peer.received + ELSEWHERE, since)
 
     def note_silence(self, node: int) -> bool:
         """Record a silent slot; return True if the node may be transmitting, as it was before."""
@@ -111,14 +111,14 @@ class Peers:
     def alive(self, node: int, since: int) -> bool:
         """Return whether any node has received a node since a time of the own clock."""
         peer = self._peers[node]
-        return max(peer.heard, peer.reported) > since
+        return max(peer.received, peer.reported) > since
 
     def table(self, members: tuple[int, ...], most: int) -> list[Entry]:
         """Return at most `most` rows of the next message: members, then other received nodes."""
         others = sorted(k for k, peer in self if peer.fresh and k not in members)
         return [self._row(k) for k in (*members, *others)][:most]
 
-    def spoken(self) -> None:
+    def begin_table(self) -> None:
         """Start a new table after the own message: later receptions are in the next one."""
         for _, peer in self:
             peer.fresh = False
@@ -127,4 +127,4 @@ class Peers:
         peer = self._peers.get(node)
         if peer is None or not peer.fresh:
             return Entry(node, None)
-        return Entry(node, peer.heard % MODULUS, peer.rx_power, peer.fp_power)
+        return Entry(node, peer.received % MODULUS, peer.rx_power, peer.fp_power)

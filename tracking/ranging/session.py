@@ -25,7 +25,7 @@ from tracking.ranging.joining import Joining
 from tracking.ranging.listening import Listener
 from tracking.ranging.members import Members
 from tracking.ranging.params import SessionParams
-from tracking.ranging.speaker import Speaker, Words
+from tracking.ranging.transmitter import Transmitter, Words
 from tracking.ranging.turns import Turns, Waiting
 
 
@@ -52,7 +52,7 @@ class Session:
         self.id, self._params, self._boot = node_id, params, boot & 0xFF
         self.role, self.root, self.round = Role.LISTENING, node_id, 0
         self._slots, self._dice = Slots(params.phy), Dice(node_id, boot)
-        self._speaker = Speaker(node_id, params, self._slots, self._boot)
+        self._transmitter = Transmitter(node_id, params, self._slots, self._boot)
         self._listener, self._members = Listener(node_id, params.exchange), Members(node_id)
         self._peers = self._listener.peers
         self._turns = Turns(node_id, params, self._slots, self._members, self._peers, self._dice)
@@ -102,16 +102,16 @@ class Session:
         arrived = unwrap(reception.stamp, self._time.now) - self._params.antenna_delay
         end = arrived + self._slots.frame(len(data))
         try:
-            heard = decode(data)
+            frame = decode(data)
         except WireError:
-            heard = None
-        if heard is None or heard.pan != self._params.pan or not self._recent(arrived):
-            self._turns.foreign |= heard is not None
+            frame = None
+        if frame is None or frame.pan != self._params.pan or not self._recent(arrived):
+            self._turns.foreign |= frame is not None
             self._unreadable()
-        elif heard.src == self.id:
-            self._own_id(heard, end)
+        elif frame.src == self.id:
+            self._own_id(frame, end)
         else:
-            self._hear(heard, reception, arrived, end)
+            self._process_frame(frame, reception, arrived, end)
         return self._give()
 
     def timeout(self, now: int) -> list[Output]:
@@ -122,7 +122,7 @@ class Session:
         if turns.waiting is Waiting.FRAME:
             self._unreadable()
         elif turns.waiting is Waiting.TURN:
-            self._speak(max(turns.expected, self._time.now + self._slots.header))
+            self._transmit(max(turns.expected, self._time.now + self._slots.header))
         elif turns.waiting is Waiting.SLOT:
             self._silent_slot()
         elif turns.waiting is Waiting.PART:
@@ -154,9 +154,9 @@ class Session:
         self._members.ids = tuple(k for k in self.members if k >= self.id)
         self.role, self.root = Role.INITIATOR, self.id
         self._members.ask_first(self._time.now)
-        self._speak(self._time.now + self._slots.turnaround + self._slots.header)
+        self._transmit(self._time.now + self._slots.turnaround + self._slots.header)
 
-    def _speak(self, at: int) -> None:
+    def _transmit(self, at: int) -> None:
         """Send the own message, its first stamp moment at or after the given time."""
         turns, kind, root = self._turns, Type.JOIN, self.root
         if self.role is Role.INITIATOR and turns.at_request:
@@ -168,11 +168,11 @@ class Session:
         n = len(self._members)
         rows = []
         if kind is not Type.JOIN:
-            rows = self._peers.table(self._members.others(), self._speaker.room)
+            rows = self._peers.table(self._members.others(), self._transmitter.room)
         words = Words(kind, root, self.round, min(turns.cursor, n), n, rows)
-        frames, sent, turns.expected = self._speaker.say(words, at)
+        frames, sent, turns.expected = self._transmitter.say(words, at)
         self._out += frames
-        self._listener.spoken(sent)
+        self._listener.note_sent(sent)
         turns.cursor += kind is not Type.JOIN
         if kind is Type.REQUEST and n == 1:
             turns.expected += self._dice.pause(self._params.idle)
@@ -182,30 +182,30 @@ class Session:
 
     def _insert(self, at: int) -> None:
         """Transmit at the start of the gap if a newcomer's attempt is due."""
-        if self._time.now + self._slots.header <= at and self._joining.speaks(self.round):
+        if self._time.now + self._slots.header <= at and self._joining.may_transmit(self.round):
             self._turns.check_at = self._time.now + self._dice.pause(self._params.first_check)
-            self._speak(at)
+            self._transmit(at)
 
-    def _hear(self, heard: Frame, reception: Reception, arrived: int, end: int) -> None:
+    def _process_frame(self, frame: Frame, reception: Reception, arrived: int, end: int) -> None:
         """Process a valid frame of another node, and keep in step with its round."""
-        turns, in_turn = self._turns, heard.type in (Type.REQUEST, Type.REPLY)
+        turns, in_turn = self._turns, frame.type in (Type.REQUEST, Type.REPLY)
         lost = turns.before in (Waiting.TAKEOVER, Waiting.WATCHDOG, Waiting.START)
-        if self.role is Role.LISTENING and heard.root == self.id:
+        if self.role is Role.LISTENING and frame.root == self.id:
             turns.resume()  # from nodes that followed this ID before it was switched on again
             return
-        follows = heard.root == self.root and self.role is not Role.LISTENING
+        follows = frame.root == self.root and self.role is not Role.LISTENING
         events = None
-        if follows or (in_turn and (heard.root < self.root or lost)):
-            events = self._listener.take(heard, reception, arrived)
+        if follows or (in_turn and (frame.root < self.root or lost)):
+            events = self._listener.take(frame, reception, arrived)
         if events is None:  # a repeat, or of a group that will follow this one on reception
             self._unreadable()
             return
         self._out += events
-        turns.heard_at = self._time.now
+        turns.received_at = self._time.now
         if in_turn:
-            self._keep_step(heard)
+            self._keep_step(frame)
         turns.expected = end + self._slots.gap
-        if heard.part + 1 < heard.parts:
+        if frame.part + 1 < frame.parts:
             turns.wait(Waiting.PART, turns.expected - self._slots.header + self._slots.sense)
             return
         self._await_slot()
@@ -214,35 +214,35 @@ class Session:
         else:
             self._insert(end + self._slots.turnaround)
 
-    def _keep_step(self, heard: Frame) -> None:
+    def _keep_step(self, frame: Frame) -> None:
         """Adopt round, slot, members and initiator of a request or a reply."""
         here = self.root, self.round, len(self._members)
-        in_step = (heard.root, heard.round, heard.n) == here
-        members = self._members.read(heard)
-        self._turns.cursor = heard.slot + 1
-        if self.role is Role.INITIATOR and heard.root == self.id:
+        in_step = (frame.root, frame.round, frame.n) == here
+        members = self._members.read(frame)
+        self._turns.cursor = frame.slot + 1
+        if self.role is Role.INITIATOR and frame.root == self.id:
             if not in_step:  # the others have lost the request: repeat it
                 self._turns.cursor = len(self._members)
             return
-        if members and (heard.type is Type.REQUEST or not in_step):
+        if members and (frame.type is Type.REQUEST or not in_step):
             self._members.ids = members
-        self.round = heard.round
-        if heard.root == self.id:  # handed over by a larger ID
+        self.round = frame.round
+        if frame.root == self.id:  # handed over by a larger ID
             self._members.ask_first(self._time.now)
-        self.role = Role.INITIATOR if heard.root == self.id else Role.RESPONDER
-        self.root = heard.root
+        self.role = Role.INITIATOR if frame.root == self.id else Role.RESPONDER
+        self.root = frame.root
 
-    def _own_id(self, heard: Frame, end: int) -> None:
+    def _own_id(self, frame: Frame, end: int) -> None:
         """Handle another node with the own ID: report it, alert it, and be silent for a while."""
-        echo = heard.boot == self._boot
+        echo = frame.boot == self._boot
         if not echo:
-            self._out.append(DuplicateId(self.id, heard.boot))
-        if echo or heard.type is Type.ALERT:  # after an alert the other node is silent
+            self._out.append(DuplicateId(self.id, frame.boot))
+        if echo or frame.type is Type.ALERT:  # after an alert the other node is silent
             self._unreadable()
             return
-        words = Words(Type.ALERT, heard.root, heard.round, min(heard.slot + 1, heard.n), heard.n)
+        words = Words(Type.ALERT, frame.root, frame.round, min(frame.slot + 1, frame.n), frame.n)
         at = max(end, self._time.now + self._slots.header) + self._slots.turnaround
-        self._out += self._speaker.say(words, at)[0]
+        self._out += self._transmitter.say(words, at)[0]
         self._forget()
         self.role, self.root = Role.MUTED, self.id
         self._turns.wait(Waiting.WATCHDOG, self._time.now + self._dice.pause(self._params.mute))
@@ -250,7 +250,7 @@ class Session:
     def _unreadable(self) -> None:
         """Handle an unreadable transmission."""
         if self.role is Role.LISTENING:
-            patience = self._turns.heard_at + ticks(self._params.watchdog)
+            patience = self._turns.received_at + ticks(self._params.watchdog)
             self._listen() if self._time.now < patience else self._turns.resume()
             return
         turns = self._turns
@@ -267,7 +267,7 @@ class Session:
         self._forget()
         self.role, self.root = Role.LISTENING, self.id
         self._members.ask_first(self._time.now)
-        self._turns.heard_at, self._turns.check_at = self._time.now, 0
+        self._turns.received_at, self._turns.check_at = self._time.now, 0
         self._joining.begin()
         self._listen()
 

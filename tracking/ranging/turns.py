@@ -23,7 +23,7 @@ class Waiting(Enum):
 
     START = "no other node may be there: become initiator"
     FRAME = "a frame is coming in"
-    TURN = "own turn: speak if the gap stays silent"
+    TURN = "own turn: transmit if the gap stays silent"
     SLOT = "the slot is silent if no preamble comes"
     PART = "the next part of a message should come"
     TAKEOVER = "the request is missing: take over"
@@ -54,7 +54,7 @@ class Turns:
         """Stamp moment of the next slot's message."""
         self.waiting = self.before = Waiting.START
         """Purpose of the deadline, and the purpose before a frame came in."""
-        self.deadline = self.heard_at = self.check_at = 0
+        self.deadline = self.received_at = self.check_at = 0
         """End of the wait; last reception of a valid frame; time from which to listen in the own
         slot."""
         self._held_deadline = 0
@@ -143,7 +143,7 @@ class Turns:
 
     def request_missing(self, root: int) -> None:
         """Wait for one's position in the succession after a missing request."""
-        self.wait(Waiting.WATCHDOG, self.heard_at + ticks(self._params.watchdog))
+        self.wait(Waiting.WATCHDOG, self.received_at + ticks(self._params.watchdog))
         heirs = [k for k in self._members.ids if k != root]
         if self._params.succession and self._id in heirs:
             patience = self._params.takeover * (heirs.index(self._id) + 1)

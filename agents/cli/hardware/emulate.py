@@ -100,7 +100,7 @@ def emulate(
         parts = rig.world.parts
         click.echo(
             f"{parts.scenario.name}, task {parts.config.task}, seed {chosen.seed}: "
-            f"{parts.n_cars} cars with {chosen.driver}, nodes speak "
+            f"{parts.n_cars} cars with {chosen.driver}, nodes send "
             f"{' and '.join(f.name for f in chosen.formats())}\n"
             f"ports {', '.join(rig.ports)} and swarm.toml in {rig.folder}"
         )
@@ -119,7 +119,7 @@ def emulate(
         emit_json([{"result": "line", **line} for line in result.lines])
         emit_json([result.summary])
         return
-    names = ("frames", "lost", "damaged", "bytes", "dropped", "unheard", "read")
+    names = ("frames", "lost", "damaged", "bytes", "dropped", "unread", "read")
     print_table(
         "Lines",
         ["line", *names],

@@ -64,7 +64,7 @@ def sniff(
     if as_json:
         emit_json([sniffed.record])
         return
-    fits = f"speaks {sniffed.format}, " if sniffed.format is not None else "no format fits, "
+    fits = f"sends {sniffed.format}, " if sniffed.format is not None else "no format fits, "
     click.echo(
         f"{port}: {fits}{sniffed.n_bytes} bytes in {sniffed.seconds:.1f} s, "
         f"{sniffed.readings} readings in {sniffed.frames} frames, {sniffed.damaged} damaged, "

@@ -92,7 +92,7 @@ class PipedKeys:
     """Keys piped from a program (gamepad, switch), whose silence stops the cars."""
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
-        self._now, self._heard, self._is_open = now, now(), True
+        self._now, self._last_input, self._is_open = now, now(), True
         self.lost = False
         """Always False for piped keys; see `TerminalKeys.lost`."""
 
@@ -106,10 +106,10 @@ class PipedKeys:
                 return ["stop", "quit"]
             pressed += keys
         if pressed:
-            self._heard = self._now()
+            self._last_input = self._now()
             return orders_of(pressed.decode(errors="replace").replace(ALIVE, "").replace("\n", ""))
-        if self._now() - self._heard > PATIENCE:
-            self._heard = self._now()
+        if self._now() - self._last_input > PATIENCE:
+            self._last_input = self._now()
             return ["stop"]
         return []
 

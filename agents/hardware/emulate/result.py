@@ -91,6 +91,6 @@ def line_figures(line: Line) -> dict[str, Any]:
         "damaged": injector.damaged,
         "bytes": counts.written,
         "dropped": counts.dropped,
-        "unheard": counts.unheard,
+        "unread": counts.unread,
         "read": counts.read,
     }

@@ -122,18 +122,18 @@ class VirtualFeed:
         self.t_ns = then
         self.rig.step(then)
         for name, port in self._measuring.items():
-            self._hear(name, port)
+            self._receive(name, port)
         for slot, (name, port, _) in self._cars.items():
-            if data := self._hear(name, port):
-                self.supervisor.hear(slot, data, then * 1e-9)
-        self._tell(Word(then * 1e-9, self._swarm.heard()))
+            if data := self._receive(name, port):
+                self.supervisor.receive(slot, data, then * 1e-9)
+        self._tell(Word(then * 1e-9, self._swarm.t_last_message()))
         self._act()
         if (then - START_NS) // STEP_NS % REPORT_EVERY == 0:
             self.report = self.supervisor.report()
             for _, port, driver in self._cars.values():
                 port.send(driver.ask())
 
-    def _hear(self, name: str, port: MemoryPort) -> bytes:
+    def _receive(self, name: str, port: MemoryPort) -> bytes:
         data = port.receive()
         if data:
             self._swarm.take(Chunk(name, self.t_ns, data))

@@ -61,7 +61,7 @@ class LinkReport:
     damaged_share: float = 0.0
     gap_s: float = 0.0
     """[s] Longest gap after the first byte."""
-    speaks: str | None = None
+    detected_format: str | None = None
     """Detected format; None if none fits."""
     nodes: list[NodeReport] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
@@ -131,9 +131,10 @@ def diagnose_car(
     report = _report(car.port.name, car.port.port, car.driver, hearing, seconds, down)
     if down:
         report.problems.append(down)
-    elif report.speaks is not None and report.speaks != car.driver:
+    elif report.detected_format is not None and report.detected_format != car.driver:
         report.problems.append(
-            f"speaks {report.speaks}, which is no car: swap the port with the one of that tracker"
+            f"sends {report.detected_format}, which is no car: swap the port with the one of that "
+            "tracker"
         )
     if losses:
         report.problems.append(_lost(losses))
@@ -151,7 +152,7 @@ def share_a_device(reports: list[LinkReport]) -> None:
             others = {first.setdefault((node.node, k), report).name for k, v in says.items() if v}
             for name in sorted(others - {report.name}):
                 report.problems.append(
-                    f"node {node.node} speaks on {name} too: give the devices ids of their "
+                    f"node {node.node} sends on {name} too: give the devices ids of their "
                     "own, or correct `ids` and `node` of the two links"
                 )
 
@@ -168,7 +169,7 @@ def _report(
         frames_hz=hearing.frames(form) / seconds,
         damaged_share=hearing.damaged_share(form),
         gap_s=hearing.longest_gap_ns / 1e9,
-        speaks=hearing.best(form),
+        detected_format=hearing.best(form),
     )
 
 
@@ -208,10 +209,10 @@ def _fatal(
             "silent: see that the device has power, its stream is switched on, and its TX is "
             "wired to RX"
         )
-    if report.speaks not in (None, link.format):
+    if report.detected_format not in (None, link.format):
         return (
-            f"speaks {report.speaks}, configured {link.format}: "
-            f'set format = "{report.speaks}", or correct the port'
+            f"sends {report.detected_format}, configured {link.format}: "
+            f'set format = "{report.detected_format}", or correct the port'
         )
     if hearing.frames(link.format):
         return ""
@@ -274,14 +275,14 @@ def _wrong_rates(report: LinkReport, nodes: Mapping[int, NodeConfig], seconds: f
 
 def _strangers(link: LinkLike, voices: Mapping[str | None, Voice]) -> list[str]:
     """Return the devices that the configuration does not assign to a node."""
-    heard: dict[str | None, None] = {}
+    devices: dict[str | None, None] = {}
     for device, voice in voices.items():
-        heard[device] = None
-        heard.update(dict.fromkeys(end for ends in voice.ranges for end in ends if end))
-    names = [d for d in heard if _node_of(d, link) is None]
+        devices[device] = None
+        devices.update(dict.fromkeys(end for ends in voice.ranges for end in ends if end))
+    names = [d for d in devices if _node_of(d, link) is None]
     flaws = [f'device {d} is no node: add `ids = {{ "{d}" = NODE }}`' for d in names if d]
     if None in names:
-        flaws.append("the format does not say who speaks: set `node`")
+        flaws.append("the format does not name the sender: set `node`")
     return flaws
 
 

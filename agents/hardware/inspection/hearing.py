@@ -199,7 +199,7 @@ def why_nothing_fits(hearing: Hearing, baud: int, formats: Formats) -> str:
     return (
         f"{hearing.n_bytes} bytes and no frame of any format: the baud rate {baud} seems wrong"
         + (f" (usual are {usual})" if usual else "")
-        + ", or the device speaks a format that is not known here"
+        + ", or the device sends a format that is not known here"
     )
 
 

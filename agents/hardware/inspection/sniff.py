@@ -180,7 +180,7 @@ def _check(hearing: Hearing, format: str | None, baud: int, formats: Formats, po
             "is wired to RX"
         )
     if format is not None and not hearing.frames(format) and best is not None:
-        raise BridgeError(f"{port}: speaks {best}, not {format}: use --format {best}")
+        raise BridgeError(f"{port}: sends {best}, not {format}: use --format {best}")
     if not hearing.frames(format or best or ""):
         raise BridgeError(f"{port}: {why_nothing_fits(hearing, baud, formats)}")
 

@@ -20,7 +20,7 @@ class NodeRow:
 
     node: int
     """Id of the node."""
-    heard_ago: float | None
+    message_age: float | None
     """[s] Time since its last message; None before the first one."""
     imu_hz: float
     """[1/s] Rate of its IMU samples."""
@@ -96,7 +96,7 @@ def take_snapshot(swarm: LiveSwarm, hz: F64, t_ns: int) -> Snapshot:
     nodes = tuple(
         NodeRow(
             node=node,
-            heard_ago=(t_ns - intake.heard_ns[k]) * 1e-9 if k in intake.heard_ns else None,
+            message_age=(t_ns - intake.received_ns[k]) * 1e-9 if k in intake.received_ns else None,
             imu_hz=float(hz[0, k]),
             range_hz=float(hz[1, k]),
             voltage=intake.voltage.get(k),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from agents.hardware.live.snapshot import Snapshot
 
 NONE = "-"
-NODE_HEADER = ("node", "heard ago", "IMU", "ranges", "battery", "heading")
+NODE_HEADER = ("node", "last message", "IMU", "ranges", "battery", "heading")
 PAIR_HEADER = ("pair", "forward", "left", "distance", "sigma", "age", "NLOS", "status")
 
 
@@ -14,7 +14,7 @@ def node_rows(snapshot: Snapshot) -> list[list[str]]:
     return [
         [
             str(n.node),
-            "never" if n.heard_ago is None else f"{n.heard_ago:.2f} s",
+            "never" if n.message_age is None else f"{n.message_age:.2f} s",
             f"{n.imu_hz:.0f} Hz",
             f"{n.range_hz:.0f} Hz",
             _number(n.voltage, "{:.2f} V"),
@@ -59,8 +59,8 @@ def line(snapshot: Snapshot) -> str:
         else f"{p.node_i}-{p.node_j} {p.distance:.2f} m +-{p.std:.2f} {p.status}"
         for p in snapshot.pairs
     )
-    heard = sum(n.heard_ago is not None and n.heard_ago < 1.0 for n in snapshot.nodes)
-    return f"{snapshot.t:7.1f} s  {heard} of {len(snapshot.nodes)} nodes heard  {pairs}"
+    active = sum(n.message_age is not None and n.message_age < 1.0 for n in snapshot.nodes)
+    return f"{snapshot.t:7.1f} s  {active} of {len(snapshot.nodes)} nodes active  {pairs}"
 
 
 def _number(value: float | None, form: str) -> str:

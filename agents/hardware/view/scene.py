@@ -35,10 +35,12 @@ _USABLE = ("ok", "lost", "doubtful", "ambiguous")
 def log_scene(rr: ModuleType, stream: Any, snapshot: Snapshot) -> None:
     """Log a snapshot at the current time of the stream."""
     places, ellipses = place(snapshot)
-    heard = {n.node: n.heard_ago is not None and n.heard_ago < SILENT_AFTER for n in snapshot.nodes}
-    ids = [node for node in heard if node in places]
+    active = {
+        n.node: n.message_age is not None and n.message_age < SILENT_AFTER for n in snapshot.nodes
+    }
+    ids = [node for node in active if node in places]
     points = np.array([places[node] for node in ids]).reshape(-1, 3)
-    colours = [NODE if heard[node] else SILENT for node in ids]
+    colours = [NODE if active[node] else SILENT for node in ids]
     labels = [str(node) for node in ids]
     stream.log("plan/nodes", rr.Points3D(points, colors=colours, labels=labels, radii=0.08))
     pointing = [n for n in snapshot.nodes if n.node in places and n.heading is not None]

@@ -63,7 +63,7 @@ def approach(
     left, right = (
         np.where(side, limit, p.max_steering).min(axis=-1) for side in (on_left, ~on_left)
     )
-    return Verdict(speeds[0], speeds[1], np.zeros(m.heard.shape, dtype=bool), left, right)
+    return Verdict(speeds[0], speeds[1], np.zeros(m.t_last_message.shape, dtype=bool), left, right)
 
 
 def bearing(ahead: F64, towards: F64) -> tuple[F64, Bool]:

@@ -55,7 +55,7 @@ def true_at(nodes, k, ticks):
 
 
 @kernel
-def hear_message(channel, latents, seed, nodes, s, r, t, motion, boxes, capsules, receptions):
+def receive_message(channel, latents, seed, nodes, s, r, t, motion, boxes, capsules, receptions):
     """Return whether node r detects the message of node s, and write its RECEPTION.
 
     Args:

@@ -16,12 +16,12 @@ from relpos_env.sensors.radio._path_kernels import (
 from tracking.kernels.jit import kernel, small_kernel
 from tracking.ranging.compiled.session import (
     may_insert,
-    speak,
     switch_on,
     take_broken,
     take_frame,
     take_preamble,
     take_timeout,
+    transmit,
 )
 
 NOTHING, END, DETECT, DEADLINE = -1, 0, 1, 2
@@ -203,10 +203,10 @@ def next_event(air, dt):
 def launch(radio, air, k):
     """Start the pending transmission of a session, if any, and update its deadline."""
     session, node, flight = air.sessions[k], air.nodes[k], air.flights[k]
-    if session.speaks:
-        session.speaks = False
+    if session.tx_pending:
+        session.tx_pending = False
         flight.active = True
-        flight.moment = true_time(node, session.speak_at)
+        flight.moment = true_time(node, session.tx_at)
         start = flight.moment - radio.header_time
         flight.detect = start + radio.detect
         flight.end = start + radio.airtime[air.messages[k].rows]
@@ -261,7 +261,7 @@ def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
                 note_range(air, r, s, distance, time, rx, out, e)
             if newcomer and may_insert(p, session):
                 at = rx.stamp + air.messages[s].ticks + p.turnaround
-                speak(p, session, air.peers, r, air.messages[r], air.rows, at)
+                transmit(p, session, air.peers, r, air.messages[r], air.rows, at)
         launch(radio, air, r)
     for m in range(n):
         flight = air.flights[m]

@@ -18,10 +18,10 @@ import numpy as np
 
 from relpos_env.errors import EnvError
 from relpos_env.sensors.radio._air_kernels import (
-    hear_message,
     local_now,
     make_nodes,
     next_window,
+    receive_message,
     true_at,
 )
 from relpos_env.sensors.radio._air_state import LATENT, NODE, RECEPTION, make_channel
@@ -93,8 +93,8 @@ class Air:
         make_nodes(self._nodes, self._seed, params.clock_offset, params.antenna_delay_std)
         self._latents = np.zeros((n_nodes, n_nodes), dtype=LATENT)
         self._latents["knot"] = -1
-        self._heard = np.zeros(n_nodes, dtype=RECEPTION)
-        self._heard["src"] = -1
+        self._receptions = np.zeros(n_nodes, dtype=RECEPTION)
+        self._receptions["src"] = -1
         self.sessions: list[Session | None] = [None] * n_nodes
         self._queue: list[list[OnAir]] = [[] for _ in range(n_nodes)]
         self._due = np.full(n_nodes, np.inf)
@@ -176,11 +176,11 @@ class Air:
         self._switch.remove((at, k, session))
         if self._queue[k] and self._queue[k][0].detected:
             for r in range(len(self._nodes)):
-                self._heard[r]["bad"] |= self._heard[r]["src"] == k
+                self._receptions[r]["bad"] |= self._receptions[r]["src"] == k
             self._queue[k] = self._queue[k][:1]  # the broken frame still ends
         else:
             self._queue[k] = []
-        self._heard[k]["src"] = -1
+        self._receptions[k]["src"] = -1
         self.sessions[k] = session
         if session is None:
             self._due[k] = np.inf
@@ -193,17 +193,17 @@ class Air:
         for r in receivers:
             if r == s or self.sessions[r] is None or self._queue[r]:
                 continue
-            before = self._heard[r].copy()
-            if not hear_message(
+            before = self._receptions[r].copy()
+            if not receive_message(
                 self._channel, self._latents, self._seed, self._nodes, s, r, message.moment,
-                *self._scene, self._heard,
+                *self._scene, self._receptions,
             ):  # fmt: skip
                 continue
-            now = self._heard[r]
+            now = self._receptions[r]
             if before["src"] >= 0:
                 spoilt = now["strength"] > before["strength"] - self._params.capture
-                self._heard[r] = before
-                self._heard[r]["bad"] |= spoilt
+                self._receptions[r] = before
+                self._receptions[r]["bad"] |= spoilt
                 continue
             self._take(r, t, self._session(r).preamble(local_now(self._nodes, r, t) % MODULUS))
 
@@ -213,20 +213,20 @@ class Air:
         self._nodes[s]["sent"] += 1
         free = [s]
         for r in range(len(self._nodes)):
-            if self._heard[r]["src"] != s:
+            if self._receptions[r]["src"] != s:
                 continue
-            heard = self._heard[r].copy()
-            self._heard[r]["src"] = -1
+            record = self._receptions[r].copy()
+            self._receptions[r]["src"] = -1
             free.append(r)
             now, session = local_now(self._nodes, r, t) % MODULUS, self._session(r)
-            if heard["bad"]:
+            if record["bad"]:
                 self._take(r, t, session.broken(now))
             else:
                 reception = Reception(
-                    int(heard["stamp"]) % MODULUS,
-                    float(heard["rx_power"]),
-                    float(heard["fp_power"]),
-                    float(heard["carrier"]),
+                    int(record["stamp"]) % MODULUS,
+                    float(record["rx_power"]),
+                    float(record["fp_power"]),
+                    float(record["carrier"]),
                 )
                 self._take(r, t, session.frame(message.data, reception, now))
         for m, queue in enumerate(self._queue):
@@ -235,7 +235,7 @@ class Air:
                 and queue[0].detected
                 and t < queue[0].moment - self._params.session.phy.detect
             ):
-                self._detect(m, t, [r for r in free if self._heard[r]["src"] < 0])
+                self._detect(m, t, [r for r in free if self._receptions[r]["src"] < 0])
 
     def _take(self, k: int, t: float, outputs: list[Output]) -> None:
         """Execute the outputs of a session."""

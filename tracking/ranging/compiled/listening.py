@@ -36,12 +36,12 @@ def forget_exchange(peer):
 @small_kernel
 def forget_peers(s, peers, me):
     """Reset the peers as `Listener.forget`."""
-    s.spoken = 0
+    s.last_sent = 0
     s.fresh = 0
     for k in range(peers.shape[0]):
         peer = peers[me, k]
         peer.known = False
-        peer.boot = peer.sent = peer.heard = peer.reported = peer.missed = peer.misfits = 0
+        peer.boot = peer.sent = peer.received = peer.reported = peer.missed = peer.misfits = 0
         peer.silences = peer.doubt = 0
         forget_exchange(peer)
 
@@ -52,15 +52,15 @@ def take_stamp(peer, boot, stamp, arrived):
     peer.known = True
     peer.doubt = DOUBT if peer.silences else max(peer.doubt - 1, 0)
     peer.silences = 0
-    if peer.heard and peer.boot == boot:
-        own = arrived - peer.heard
+    if peer.received and peer.boot == boot:
+        own = arrived - peer.received
         if own > 0 and same_moment(stamp - peer.sent, own, own):
-            peer.sent, peer.heard, peer.misfits = stamp, arrived, 0
+            peer.sent, peer.received, peer.misfits = stamp, arrived, 0
             return 1
         peer.misfits += 1
         if peer.misfits < PATIENCE:
             return -1
-    peer.boot, peer.sent, peer.heard, peer.misfits = boot, stamp, arrived, 0
+    peer.boot, peer.sent, peer.received, peer.misfits = boot, stamp, arrived, 0
     return 0
 
 
@@ -90,10 +90,10 @@ def take_message(p, s, peers, me, src, message, rows, arrived, carrier):
     if goes_on == 0:
         forget_exchange(peer)
     s.fresh |= 1 << src
-    heard = message.heard
+    stamped = message.stamped
     k = 0
-    while heard:
-        if heard & 1:
+    while stamped:
+        if stamped & 1:
             ago = message.stamp - rows[src, k]
             if ago > 0:
                 when = arrived - ago
@@ -101,11 +101,11 @@ def take_message(p, s, peers, me, src, message, rows, arrived, carrier):
                     other = peers[me, k]
                     other.known = True
                     other.reported = max(other.reported, when)
-                elif s.spoken and same_moment(when, s.spoken, ago) and me < src:
+                elif s.last_sent and same_moment(when, s.last_sent, ago) and me < src:
                     peer.asked = True
-                    peer.asked_sent = s.spoken
+                    peer.asked_sent = s.last_sent
                     peer.asked_received = peer.sent - ago
-        heard >>= 1
+        stamped >>= 1
         k += 1
     if me > src:
         return True, -1.0, 0

@@ -57,7 +57,7 @@ def begin(p, s, peers, me):
     forget_peers(s, peers, me)
     set_members(s, 1 << me)
     s.role, s.root = LISTENING, me
-    s.asked_before = s.asked_at = s.heard_at = s.now
+    s.asked_before = s.asked_at = s.received_at = s.now
     s.check_at = s.attempts = s.backoff = 0
     s.tried_round = -1
     listen(p, s)
@@ -96,7 +96,7 @@ def take_timeout(p, s, peers, me, message, rows):
             s.role, s.root = INITIATOR, me
             s.asked_before = s.asked_at = s.now
             at = s.now + p.turnaround + p.header
-        speak(p, s, peers, me, message, rows, at)
+        transmit(p, s, peers, me, message, rows, at)
 
 
 @small_kernel
@@ -121,7 +121,7 @@ def take_frame(p, s, peers, me, src, message, rows, arrived, carrier, now):
     if not taken:
         unreadable(p, s, me)
         return False, -1.0, 0
-    s.heard_at = s.now
+    s.received_at = s.now
     if in_turn:
         keep_step(s, me, message)
     s.expected = arrived + message.ticks + p.gap
@@ -151,7 +151,7 @@ def keep_step(s, me, message):
 
 @small_kernel
 def may_insert(p, s):
-    """Return `Joining.speaks`, and schedule the check as `Session._insert`."""
+    """Return `Joining.may_transmit`, and schedule the check as `Session._insert`."""
     if s.round == s.tried_round:
         return False
     if s.backoff > 0:
@@ -165,8 +165,8 @@ def may_insert(p, s):
 
 
 @small_kernel
-def speak(p, s, peers, me, message, rows, at):
-    """Prepare a message as `Session._speak`; it waits to be sent.
+def transmit(p, s, peers, me, message, rows, at):
+    """Prepare a message as `Session._transmit`; it waits to be sent.
 
     Args:
         p: SessionNumbers.
@@ -194,13 +194,13 @@ def speak(p, s, peers, me, message, rows, at):
     message.type, message.root, message.round = kind, root, s.round
     message.slot, message.n, message.boot = min(s.cursor, s.n), s.n, s.boot
     message.stamp, message.members = at, s.members
-    message.heard = 0 if kind == JOIN else s.fresh
+    message.stamped = 0 if kind == JOIN else s.fresh
     message.rows, message.ticks = n_rows, p.frame[n_rows]
     for k in range(peers.shape[0]):
-        rows[me, k] = peers[me, k].heard
+        rows[me, k] = peers[me, k].received
     s.fresh = 0
-    s.spoken = at
-    s.speaks, s.speak_at = True, at
+    s.last_sent = at
+    s.tx_pending, s.tx_at = True, at
     s.expected = at + message.ticks + p.gap
     if kind != JOIN:
         s.cursor += 1
@@ -219,7 +219,7 @@ def renew_members(p, s, peers, me):
         peer = peers[me, k]
         if not peer.known:
             continue
-        if max(peer.heard, peer.reported) > s.asked_before:
+        if max(peer.received, peer.reported) > s.asked_before:
             peer.missed = 0
             members |= 1 << k
         else:

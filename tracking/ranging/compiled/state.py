@@ -37,15 +37,15 @@ SESSION = np.dtype(
         ("before", "i8"),
         ("deadline", "i8"),
         ("held_deadline", "i8"),
-        ("heard_at", "i8"),
+        ("received_at", "i8"),
         ("check_at", "i8"),
         ("early", "?"),
         ("opened", "i8"),
-        # Listener and Speaker
-        ("spoken", "i8"),
+        # Listener and Transmitter
+        ("last_sent", "i8"),
         ("fresh", "i8"),  # bit k: received since the own last message
-        ("speaks", "?"),  # a message is waiting to be sent, or is being sent
-        ("speak_at", "i8"),
+        ("tx_pending", "?"),  # a message is waiting to be sent, or is being sent
+        ("tx_at", "i8"),
     ]
 )
 """State of one node."""
@@ -55,7 +55,7 @@ PEER = np.dtype(
         ("known", "?"),
         ("boot", "i8"),
         ("sent", "i8"),
-        ("heard", "i8"),
+        ("received", "i8"),
         ("reported", "i8"),
         ("missed", "i8"),
         ("misfits", "i8"),
@@ -86,7 +86,7 @@ MESSAGE = np.dtype(
         ("boot", "i8"),
         ("stamp", "i8"),  # sender's clock without wraps
         ("members", "i8"),  # first rows of the table; with the sender if it is a member
-        ("heard", "i8"),  # bit k: row k has a stamp
+        ("stamped", "i8"),  # bit k: row k has a stamp
         ("rows", "i8"),  # length of the table
         ("ticks", "i8"),  # time on the air
     ]

@@ -107,7 +107,7 @@ def silent_slot(p, s, peers, me):
     peer = peers[me, node]
     waits = False
     if node != me and peer.known:
-        waits = peer.reported > max(peer.heard + ELSEWHERE, since)
+        waits = peer.reported > max(peer.received + ELSEWHERE, since)
     if missing and not waits:
         request_missing(p, s, me)
         return
@@ -126,7 +126,7 @@ def silent_slot(p, s, peers, me):
 @small_kernel
 def request_missing(p, s, me):
     """Wait for a takeover as `Turns.request_missing`."""
-    wait(s, WATCHDOG, s.heard_at + p.watchdog)
+    wait(s, WATCHDOG, s.received_at + p.watchdog)
     if p.succession and me != s.root and (s.members >> me) & 1:
         heirs = s.members & ~(1 << s.root)
         patience = p.takeover * (place_of(heirs, me) + 1)
@@ -139,7 +139,7 @@ def request_missing(p, s, me):
 def unreadable(p, s, me):
     """Handle noise as `Session._unreadable` and `Turns.unreadable`."""
     if s.role == LISTENING:
-        if s.now < s.heard_at + p.watchdog:
+        if s.now < s.received_at + p.watchdog:
             listen(p, s)
         else:
             wait(s, s.before, s.held_deadline)

@@ -46,7 +46,7 @@ MAX_PARTS = 16
 _HEADER = struct.Struct("<HBHHHBBBBBBB")
 _FRAME_CONTROL = 0x8841
 _BROADCAST = 0xFFFF
-_NOT_HEARD = 15
+_NOT_RECEIVED = 15
 _POWER_TOP, _POWER_STEP = -60.0, 3.0
 
 
@@ -186,11 +186,11 @@ def decode(data: bytes) -> Frame:
 
 def _quality(entry: Entry) -> int:
     if entry.stamp is None:
-        return _NOT_HEARD << 4
+        return _NOT_RECEIVED << 4
     rx, fp = entry.rx_power, entry.fp_power
     if not (math.isfinite(rx) and math.isfinite(fp)):
-        return _NOT_HEARD - 1 << 4 | 15  # an empty register of the radio: weakest power
-    step = min(max(round((_POWER_TOP - rx) / _POWER_STEP), 0), _NOT_HEARD - 1)
+        return _NOT_RECEIVED - 1 << 4 | 15  # an empty register of the radio: weakest power
+    step = min(max(round((_POWER_TOP - rx) / _POWER_STEP), 0), _NOT_RECEIVED - 1)
     return step << 4 | min(max(round(rx - fp), 0), 15)
 
 
@@ -199,9 +199,9 @@ def _entry(row: bytes) -> Entry:
     if row[0] > MAX_ID:
         raise WireError(f"table: expected IDs up to {MAX_ID}, got {row[0]}")
     stamp = int.from_bytes(row[1:6], "little")
-    if step == _NOT_HEARD:
+    if step == _NOT_RECEIVED:
         if gap or stamp:
-            raise WireError("table: a node that was not heard has a stamp")
+            raise WireError("table: a node that was not received has a stamp")
         return Entry(row[0], None)
     rx = _POWER_TOP - _POWER_STEP * step
     return Entry(row[0], stamp % MODULUS, rx, rx - gap)

@@ -32,7 +32,7 @@ class Words:
     rows: Sequence[Entry] = ()
 
 
-class Speaker:
+class Transmitter:
     """Transmitter of one node."""
 
     def __init__(self, node_id: int, params: SessionParams, slots: Slots, boot: int) -> None:
