@@ -12,8 +12,8 @@ import numpy as np
 from relpos_env.core.tracked_world import default_params
 from relpos_env.errors import EnvError, UnknownArgument
 from relpos_env.interface.actions import ActionMode, action_mode
-from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.interface.observations import ModeBuilder, ObservationMode, observation_mode
+from relpos_env.interface.rangefinders import MAX_RANGEFINDERS
 from relpos_env.registry import look_up
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios import scenario as find_scenario
@@ -101,7 +101,7 @@ class FormationConfig:
             self,
             max_cycles=whole_number("max_cycles", self.max_cycles, 1, 800_000),
             history=whole_number("history", self.history, 1, 64),
-            proximity=whole_number("proximity", self.proximity, 0, MOST_BEAMS),
+            proximity=whole_number("proximity", self.proximity, 0, MAX_RANGEFINDERS),
         )
         if self.physics not in (None, *get_args(Physics)):
             raise EnvError(f"physics: expected pymunk or fast, got {self.physics!r}")

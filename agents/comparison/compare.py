@@ -15,7 +15,7 @@ from agents.comparison.setting import Setting
 from agents.errors import UsageError
 from agents.jobs import check_jobs, find_engine
 from agents.simulation.demo import SETTLE
-from relpos_env.interface.beams import MOST_BEAMS
+from relpos_env.interface.rangefinders import MAX_RANGEFINDERS
 
 FIRST_SEED = 1000
 """Seed of the first episode. Training draws its seeds at random from 2^30 numbers."""
@@ -93,8 +93,8 @@ def compare(
         )
         for scenario in each_once("--scenario", scenarios)
     ]
-    if proximity is not None and not 0 <= proximity <= MOST_BEAMS:
-        raise UsageError(f"--proximity: expected 0 to {MOST_BEAMS}, got {proximity}")
+    if proximity is not None and not 0 <= proximity <= MAX_RANGEFINDERS:
+        raise UsageError(f"--proximity: expected 0 to {MAX_RANGEFINDERS}, got {proximity}")
     chosen = line_up(each_once("NAME", drivers), modes(observations), proximity)
     empty, notes = _who_can(chosen, settings)
     seeds = range(first_seed, first_seed + episodes)

@@ -133,7 +133,7 @@ class Contender:
 
 def sees(observation: str, proximity: int) -> str:
     """Return the label of an observation mode and its distance sensors for tables."""
-    return f"{observation}, {proximity} beams" if proximity else observation
+    return f"{observation}, {proximity} distance sensors" if proximity else observation
 
 
 def line_up(
@@ -153,13 +153,13 @@ def line_up(
     entries = [find_entry(name) for name in names]
     titles = [entry.title for entry in entries]
     most = max((entry.proximity or 0 for entry in entries), default=0)
-    beams = [
+    proximities = [
         proximity if proximity is not None else most if entry.proximity is None else entry.proximity
         for entry in entries
     ]
     return [
         # Drivers with the same title are shown with their names instead.
         Contender(name, observation, title if titles.count(title) == 1 else name, n)
-        for name, title, n in zip(names, titles, beams, strict=True)
+        for name, title, n in zip(names, titles, proximities, strict=True)
         for observation in observations
     ]

@@ -196,19 +196,19 @@ def _seat(
 ) -> tuple[list[_Seat], list[str]]:
     """Return the candidates that are compatible with the cars, and notes on the others."""
     seats, notes = [], []
-    n_beams = config.task.proximity
-    for contender in line_up(drivers, observations, n_beams):
+    n_rangefinders = config.task.proximity
+    for contender in line_up(drivers, observations, n_rangefinders):
         entry = find_entry(contender.name)
         if contender.observation == "truth":
             why: str | None = "real cars know no truth"
-        elif entry.proximity is not None and entry.proximity != n_beams:
-            why = f"expected {entry.proximity} beams, the cars have {n_beams}"
+        elif entry.proximity is not None and entry.proximity != n_rangefinders:
+            why = f"expected {entry.proximity} distance sensors, the cars have {n_rangefinders}"
         else:
-            why = entry.refusal(contender.observation, config.n_slots, n_beams)
+            why = entry.refusal(contender.observation, config.n_slots, n_rangefinders)
         if why is not None:
             notes.append(f"{contender.label} in {config.name}: {why}")
             continue
-        driver = entry.driver(contender.observation, config.n_slots, n_beams)
+        driver = entry.driver(contender.observation, config.n_slots, n_rangefinders)
         seats.append(_Seat(contender, entry.trained_on, entry.history, driver))
     if not seats:
         raise UsageError("NAME: nothing to compare: " + "; ".join(notes))

@@ -166,9 +166,9 @@ def mode_of(fields: tuple[Field, ...]) -> str:
     """
     names = [f.name for f in fields]
     others = next((f.size for f in fields if f.name == "mask"), 0)
-    beams = next((f.size for f in fields if f.name == "near"), 0)
+    n_rangefinders = next((f.size for f in fields if f.name == "near"), 0)
     for name in OBSERVATIONS:
-        if others and observation_mode(name, others + 1, beams).fields == fields:
+        if others and observation_mode(name, others + 1, n_rangefinders).fields == fields:
             return name
     return f"fields {', '.join(names)}"
 

@@ -150,8 +150,8 @@ def clear_arc(
 
 def _unseen(around: Surroundings, params: ClearanceParams) -> float:
     """Return the increase of distances for the angles between sensor cones [m]."""
-    beams: int = around.ahead.shape[-1]
-    return params.per_gap * max(2.0 * pi / beams - 2.0 * HALF_CONE, 0.0)
+    n_rangefinders: int = around.ahead.shape[-1]
+    return params.per_gap * max(2.0 * pi / n_rangefinders - 2.0 * HALF_CONE, 0.0)
 
 
 def _outside(x: F64, y: F64) -> F64:

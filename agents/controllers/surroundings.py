@@ -19,7 +19,7 @@ from math import pi, radians, tan
 import numpy as np
 
 from agents.controllers.base import TINY, Plane, Sight
-from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
+from relpos_env.interface.rangefinders import FARTHEST, rangefinder_directions, rangefinder_origins
 from tracking.arrays import F64
 from tracking.params.short_repr import short_repr
 
@@ -63,8 +63,8 @@ def surroundings(sight: Sight) -> Surroundings | None:
     if sight.near is None:
         return None
     near, n = sight.near, sight.near.shape[-1]
-    directions = beam_directions(n)
-    starts = beam_starts(directions, HALF_LENGTH, HALF_WIDTH)
+    directions = rangefinder_directions(n)
+    starts = rangefinder_origins(directions, HALF_LENGTH, HALF_WIDTH)
     slant = np.zeros_like(near)
     if n >= ENOUGH:
         whole = starts + near

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from relpos_env.config import MOST_CARS, Parts, whole_number
-from relpos_env.interface.beams import MOST_BEAMS
 from relpos_env.interface.observations import Field, index_table, observation_mode, total_size
 from relpos_env.interface.observations.base import F32
+from relpos_env.interface.rangefinders import MAX_RANGEFINDERS
 from relpos_env.interface.views import make_view
 from relpos_env.registry import name_of
 from tracking.arrays import I64
@@ -48,7 +48,7 @@ class Layout:
     def __post_init__(self) -> None:
         whole_number("n_cars", self.n_cars, 2, MOST_CARS)
         whole_number("history", self.history, 1, MOST_HISTORY)
-        whole_number("proximity", self.proximity, 0, MOST_BEAMS)
+        whole_number("proximity", self.proximity, 0, MAX_RANGEFINDERS)
         observation_mode(self.observation, self.n_cars)
 
     @classmethod
@@ -91,8 +91,8 @@ class Layout:
     def describe(self) -> str:
         """Return a description for messages."""
         times = "" if self.history == 1 else f", {self.history} in one"
-        beams = "" if self.proximity == 0 else f" with {self.proximity} beams"
-        return f"observation {self.observation!r} of {self.n_cars} cars{beams}{times}"
+        sensors = "" if self.proximity == 0 else f" with {self.proximity} distance sensors"
+        return f"observation {self.observation!r} of {self.n_cars} cars{sensors}{times}"
 
     def differences(self, index: list[dict[str, Any]]) -> list[str]:
         """Return the differences of another table of fields from this layout's, one per row.
@@ -122,7 +122,7 @@ class Layout:
         if other.history != self.history:
             return f"{expected}: the history differs"
         if other.proximity != self.proximity:
-            return f"{expected}: the beams differ"
+            return f"{expected}: the numbers of distance sensors differ"
         same = replace(other, n_cars=self.n_cars)
         if same.digest != self.digest:
             return f"{expected}: the numbers differ"

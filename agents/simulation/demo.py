@@ -152,8 +152,8 @@ def demo(
     if trained is not None:
         if proximity not in (None, trained.layout.proximity):
             raise UsageError(
-                f"proximity: expected {trained.layout.proximity}, the beams of the policy, "
-                f"got {proximity}"
+                f"proximity: expected {trained.layout.proximity}, the distance sensors of the "
+                f"policy, got {proximity}"
             )
         proximity = trained.layout.proximity
     for n, (information, mode) in enumerate(modes.items()):

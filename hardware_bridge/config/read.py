@@ -16,7 +16,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.wire.key import REMOVED_KEY
 from relpos_env.errors import EnvError
-from relpos_env.interface.beams import MOST_BEAMS
+from relpos_env.interface.rangefinders import MAX_RANGEFINDERS
 from relpos_env.tasks import TASKS, make_task
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
@@ -135,8 +135,8 @@ def _task(
         raise at.key("room").error(
             f"expected above 0 and at most {LARGEST_ROOM:g} m a side, got {list(config.room)}"
         )
-    if not 0 <= config.proximity <= MOST_BEAMS:
-        raise at.key("proximity").error(f"expected 0 to {MOST_BEAMS}, got {config.proximity}")
+    if not 0 <= config.proximity <= MAX_RANGEFINDERS:
+        raise at.key("proximity").error(f"expected 0 to {MAX_RANGEFINDERS}, got {config.proximity}")
     if not (with_files or config.name in TASKS):
         raise at.key("name").error(f"expected one of {', '.join(TASKS)}, got {config.name!r}")
     n = int((~group.is_static).sum())

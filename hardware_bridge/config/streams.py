@@ -112,7 +112,7 @@ def _check_scanner(
             Where(where.file, raises=BridgeError)
             .key("task")
             .key("proximity")
-            .error("expected the number of beams that a scanner fills, 1 to 32")
+            .error("expected the number of distance sensors that a scanner replaces, 1 to 32")
         )
 
 

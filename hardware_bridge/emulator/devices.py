@@ -22,7 +22,7 @@ from hardware_bridge.readings import (
     Source,
     StatusReading,
 )
-from relpos_env.interface.beams import FARTHEST
+from relpos_env.interface.rangefinders import FARTHEST
 from tracking.arrays import F64, Bool
 
 TELEMETRY_EVERY = 0.02

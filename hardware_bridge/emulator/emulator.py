@@ -60,7 +60,7 @@ class World(Protocol):
         """Return the wheel speeds [m/s] and the steering angles of the servos [rad], (car)."""
 
     def near(self) -> F64:
-        """Return the distances measured by the cars' own sensors, (car, beam) [m]."""
+        """Return the distances measured by the cars' own sensors, (car, sensor) [m]."""
 
 
 class Emulator:

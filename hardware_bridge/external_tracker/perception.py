@@ -39,7 +39,7 @@ class ReadyPerception:
         pending: PendingReports,
         block: MeasurementBlock,
         powered: Bool,
-        n_beams: int = 0,
+        n_rangefinders: int = 0,
     ) -> None:
         """Create a perception without reports.
 
@@ -49,7 +49,7 @@ class ReadyPerception:
             pending: Reports, filled by the caller before every step and emptied by it.
             block: Measurements, of which departures and ranges are used.
             powered: True for present cars, (1, car); written by the caller before every step.
-            n_beams: Number of distance sensors of each car.
+            n_rangefinders: Number of distance sensors of each car.
         """
         group, n_cars = constellation, powered.shape[1]
         self.constellation, self._params, self._pending = group, params, pending
@@ -59,7 +59,7 @@ class ReadyPerception:
         self._nodes = self._tracks(moves.astype(np.float64))
         self._pairs = self._tracks(ends)
         self._headings = Headings(group.n_nodes)
-        self.view: AgentView = make_view(1, n_cars, n_beams)
+        self.view: AgentView = make_view(1, n_cars, n_rangefinders)
         self.estimate = TeamEstimate.empty(group, np.zeros(1))
         """Current estimates, overwritten by every step."""
         self._turns: F64 = np.zeros((1, group.n_nodes))

@@ -8,7 +8,7 @@ import numpy as np
 
 from hardware_bridge.ingest.scanner import ScannerMount
 from hardware_bridge.readings import ScanReading
-from relpos_env.interface.beams import FARTHEST
+from relpos_env.interface.rangefinders import FARTHEST
 from tracking.arrays import F64, I64
 
 LASTS, N_SPANS = 0.3, 6
@@ -20,16 +20,16 @@ SPAN_NS = round(LASTS * 1e9) // N_SPANS
 class Near:
     """Distance sensors of a group of cars. A sensor measures the nearest distance in its sector."""
 
-    def __init__(self, n_slots: int, n_beams: int) -> None:
+    def __init__(self, n_slots: int, n_rangefinders: int) -> None:
         """Create sensors without measurements.
 
         Args:
             n_slots: Number of cars.
-            n_beams: Number of distance sensors around each car; 0 for none.
+            n_rangefinders: Number of distance sensors around each car; 0 for none.
         """
-        shape = n_slots, n_beams, N_SPANS
+        shape = n_slots, n_rangefinders, N_SPANS
         self._distance: F64 = np.zeros(shape)
-        """[m] Nearest distance per time span, (slot, beam, span); the spans are a ring buffer."""
+        """[m] Nearest distance per time span, (slot, sensor, span); the spans are a ring buffer."""
         self._span: I64 = np.full(shape, -N_SPANS, dtype=np.int64)
         """[-] Number of the time span of each entry of `_distance`."""
 
@@ -42,13 +42,13 @@ class Near:
             distance: Distance [m]; None if there is no object.
             t_ns: Arrival [ns].
         """
-        n_slots, n_beams, _ = self._distance.shape
-        if not (n_beams and slot < n_slots and math.isfinite(bearing)):
+        n_slots, n_rangefinders, _ = self._distance.shape
+        if not (n_rangefinders and slot < n_slots and math.isfinite(bearing)):
             return
-        beam = round(bearing / (2.0 * math.pi) * n_beams) % n_beams
+        sensor = round(bearing / (2.0 * math.pi) * n_rangefinders) % n_rangefinders
         seen = FARTHEST if distance is None else min(max(distance, 0.0), FARTHEST)
         span = t_ns // SPAN_NS
-        at = slot, beam, span % N_SPANS
+        at = slot, sensor, span % N_SPANS
         if span != self._span[at] or seen < self._distance[at]:
             self._distance[at], self._span[at] = seen, span
 
@@ -62,8 +62,8 @@ class Near:
         if seen is not None:
             self.take(slot, *seen, t_ns)
 
-    def beams(self, t_ns: int) -> F64:
-        """Return the distances at `t_ns`, (slot, beam) [m]; 0 without a recent one, a contact."""
+    def distances(self, t_ns: int) -> F64:
+        """Return the distances at `t_ns`, (slot, sensor) [m]; 0 without a recent one, a contact."""
         fresh = self._span > t_ns // SPAN_NS - N_SPANS
         nearest = np.where(fresh, self._distance, np.inf).min(axis=-1)
         distances: F64 = np.where(np.isfinite(nearest), nearest, 0.0)

@@ -154,9 +154,9 @@ class LiveSwarm:
         tracker, group = self.config.tracker, self.group
         if tracker.source == "positions":
             pending = self.intake.other.pending
-            n_beams = self.config.task.proximity
+            n_rangefinders = self.config.task.proximity
             return ReadyPerception(
-                group, tracker.positions, pending, self._block, self._powered, n_beams
+                group, tracker.positions, pending, self._block, self._powered, n_rangefinders
             )
         believed = FOR_POLICIES
         if tracker.accuracy is not None:
@@ -170,7 +170,7 @@ class LiveSwarm:
             self._powered,
             filter=tracker.filter,
             room=self._room,
-            n_beams=self.config.task.proximity,
+            n_rangefinders=self.config.task.proximity,
         )
 
     def _let_go(self, t_ns: int, now: float) -> None:
@@ -216,7 +216,7 @@ class LiveSwarm:
             asked = intake.trims.newest.get(k)
             fresh = asked is not None and (t_ns - asked[0]) * 1e-9 <= SILENT
             self.trim[0, k] = asked[1] if fresh and asked is not None else 0.0
-        view.near[0] = np.where(view.present[0][:, None], intake.near.beams(t_ns), 0.0)
+        view.near[0] = np.where(view.present[0][:, None], intake.near.distances(t_ns), 0.0)
         intake.other.driving = frozenset(driving)
 
 

@@ -64,7 +64,7 @@ class TrackedWorld:
             swarm.powered,
             filter=filter,
             room=waiting_at_most(scenario, n_cars, params, n_steps),
-            n_beams=proximity,
+            n_rangefinders=proximity,
         )
         self._singles: dict[int, TrackedWorld] = {}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from relpos_env.interface.beams import FARTHEST
+from relpos_env.interface.rangefinders import FARTHEST
 from tracking.kernels.jit import kernel, small_kernel
 
 FAR, FAST = 20.0, 10.0

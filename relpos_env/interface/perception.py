@@ -46,7 +46,7 @@ class Perception:
         *,
         filter: str | FilterBuilder,
         room: int,
-        n_beams: int = 0,
+        n_rangefinders: int = 0,
     ) -> None:
         """Create trackers in their initial state.
 
@@ -57,14 +57,14 @@ class Perception:
             powered: True where the car's tracker runs, (env, car), updated in place as well.
             filter: One of `tracking.filters.FILTERS`.
             room: Capacity of the horizon in measurements.
-            n_beams: Number of distance sensors per car.
+            n_rangefinders: Number of distance sensors per car.
         """
         n_envs, n_cars = powered.shape
         self.constellation = constellation
         self.tracker = Tracker(constellation, params, filter=filter, n_envs=n_envs)
         self.horizon = Horizon(params.horizon, n_envs)
         self.horizon.reserve(room)
-        self.view: AgentView = make_view(n_envs, n_cars, n_beams)
+        self.view: AgentView = make_view(n_envs, n_cars, n_rangefinders)
         self.estimate = TeamEstimate.empty(constellation, np.zeros(n_envs))
         """Last estimate of the tracker, delayed by the horizon, overwritten by the next."""
         self._room = room

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from relpos_env.interface._view_kernels import see_estimate, see_truth
-from relpos_env.interface.beams import FARTHEST
+from relpos_env.interface.rangefinders import FARTHEST
 from tracking.arrays import F64, I64, Bool
 from tracking.estimate import TeamEstimate
 from tracking.kernels.jit import bind
@@ -57,7 +57,7 @@ class AgentView(NamedTuple):
     """Steering angle of the car's own servo, (env, car) [rad]."""
     near: F64
     """Readings of the car's distance sensors (walls, boxes and cars), the first straight ahead,
-    then counter-clockwise, (env, car, ray) [m]."""
+    then counter-clockwise, (env, car, sensor) [m]."""
     present: Bool
     """True while the car is in the room, (env, car)."""
     now: F64
@@ -68,7 +68,7 @@ class AgentView(NamedTuple):
         return AgentView._make(array[envs] for array in self)
 
 
-def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> AgentView:
+def make_view(n_envs: int, n_cars: int, n_rangefinders: int = 0) -> AgentView:
     """Return a view without estimates, with distance sensors at their maximum range."""
     own, other = (n_envs, n_cars), (n_envs, n_cars, n_cars)
     return AgentView(
@@ -89,7 +89,7 @@ def make_view(n_envs: int, n_cars: int, n_beams: int = 0) -> AgentView:
         command=np.zeros((*own, 2)),
         speed=np.zeros(own),
         steering=np.zeros(own),
-        near=np.full((*own, n_beams), FARTHEST),
+        near=np.full((*own, n_rangefinders), FARTHEST),
         present=np.zeros(own, dtype=bool),
         now=np.zeros(n_envs),
     )

@@ -10,7 +10,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from relpos_env.errors import EnvError
-from relpos_env.interface.beams import FARTHEST
+from relpos_env.interface.rangefinders import FARTHEST
 from relpos_env.sensors.imu import ImuSimParams
 from relpos_env.sensors.magnetometer import MagSimParams
 from relpos_env.sensors.odometer import OdometerSimParams

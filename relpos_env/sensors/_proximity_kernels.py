@@ -19,14 +19,14 @@ def read_proximity(p, seeds, tick, directions, body, present, size, room, boxes,
         p: PROXIMITY, (env).
         seeds: Seeds of the sensors, uint64, (env).
         tick: Number of the reading, (env).
-        directions: Unit vectors of the sensor axes in the frame of the car, (beam, 2).
+        directions: Unit vectors of the sensor axes in the frame of the car, (sensor, 2).
         body: x, y, heading and velocities of cars, (env, car, 6).
         present: Mask of present cars, (env, car).
         size: Half length and width of a car [m], (env, 2).
         room: Half width and depth [m], (env, 2).
         boxes: Centre, half width and depth [m], cosine, sine, (env, box, 6); a half width of 0
             marks an unused row.
-        out: Distances, (env, car, beam) [m], written; 0 for absent cars.
+        out: Distances, (env, car, sensor) [m], written; 0 for absent cars.
     """
     for e in range(out.shape[0]):
         for n in range(out.shape[1]):

@@ -1,6 +1,6 @@
 """Distance sensors around a car: ranges to walls, boxes and cars, independent of radios.
 
-`relpos_env.interface.beams` defines their positions and directions. The field of view of a
+`relpos_env.interface.rangefinders` defines their positions and directions. The field of view of a
 sensor is a cone; a reading is the distance from its tip to the nearest surface in the cone.
 
 References:
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 from typing import Any
 
-from relpos_env.interface.beams import FARTHEST
+from relpos_env.interface.rangefinders import FARTHEST
 from relpos_env.world.parameter_records import fill_numbers, numbers_dtype
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from relpos_env.geometry._clearance_kernels import read_clearances
 from relpos_env.geometry.line_of_sight import pairs_in_sight
-from relpos_env.interface.beams import beam_directions
+from relpos_env.interface.rangefinders import rangefinder_directions
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios.episode import Episode
 from relpos_env.sensors._odometer_kernels import read_odometers
@@ -77,7 +77,7 @@ class World:
         self.odometer: F64 = np.zeros((e, n))
         """Last readings of the odometers, (env, car) [m/s]."""
         self.proximity: F64 = np.zeros((e, n, proximity))
-        """Last readings of the distance sensors, (env, car, beam) [m]; 0 for absent cars."""
+        """Last readings of the distance sensors, (env, car, sensor) [m]; 0 for absent cars."""
         self._clearance: F64 = np.zeros((e, n))
         self._radio = Radio(scenario.radio.for_nodes(n), n, [0] * e, DT)
         self._scene = Scene(
@@ -272,8 +272,8 @@ class World:
         )  # fmt: skip
         self._read_proximity = bind(
             read_proximity, sensors.proximity, sensors.proximity_seed, bodies.tick,
-            beam_directions(self.proximity.shape[-1]), bodies.body, bodies.present, bodies.size,
-            bodies.room, bodies.boxes, self.proximity,
+            rangefinder_directions(self.proximity.shape[-1]), bodies.body, bodies.present,
+            bodies.size, bodies.room, bodies.boxes, self.proximity,
         )  # fmt: skip
         self._read_clearances = bind(
             read_clearances, bodies.body, bodies.present, bodies.size, bodies.room, bodies.boxes,

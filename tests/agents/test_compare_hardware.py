@@ -192,7 +192,7 @@ def test_drivers_with_beams_and_none_at_all_are_refused(monkeypatch):
         hardware, "line_up", lambda names, modes, n: [Contender(k, m) for k in names for m in modes]
     )
     with pytest.raises(
-        UsageError, match="nothing to compare: seer on estimate .* expected 8 beams"
+        UsageError, match="nothing to compare: seer on estimate .* expected 8 distance sensors"
     ):
         run(None, drivers=["seer"])
 

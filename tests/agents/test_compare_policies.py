@@ -59,10 +59,10 @@ def test_beams_are_those_of_the_policies_unless_said(tmp_path):
     same = dict(scenarios=["cars-nlos"], episodes=1, seconds=1.0, settle=0.0)
     result = compare(drivers=["consensus", who], **same)
     assert [r["proximity"] for r in result.records] == [4, 4]
-    assert result.rows[0].contender.label == "consensus on estimate, 4 beams"
+    assert result.rows[0].contender.label == "consensus on estimate, 4 distance sensors"
     result = compare(drivers=["consensus", who], proximity=0, **same)
     assert [(r["policy"], r["proximity"]) for r in result.records] == [("consensus", 0)]
-    assert "the beams differ" in result.notes[0]
+    assert "the numbers of distance sensors differ" in result.notes[0]
     with pytest.raises(UsageError, match="--proximity: expected 0 to 32, got 40"):
         compare(drivers=["consensus"], proximity=40, **same)
 

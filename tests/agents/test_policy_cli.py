@@ -102,7 +102,9 @@ def test_beams_of_a_demonstration_are_those_of_the_policy(tmp_path):
     small(tmp_path, Layout("estimate", 3, 1, 4), name="small")
     policy = tmp_path / "small.onnx"
     assert demo(policy=policy, scenario="cars-nlos", seconds=0.5).driver == "small"
-    with pytest.raises(UsageError, match="proximity: expected 4, the beams of the policy, got 8"):
+    with pytest.raises(
+        UsageError, match="proximity: expected 4, the distance sensors of the policy, got 8"
+    ):
         demo(policy=policy, proximity=8)
     assert isinstance(run("demo", "--proximity", "33").exception, UsageError)
 

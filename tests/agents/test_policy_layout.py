@@ -116,8 +116,10 @@ def test_other_beams_are_another_layout():
     assert len({without.digest, some.digest, more.digest}) == 3
     reason = some.refusal(more)
     assert reason is not None
-    assert reason.endswith("of 3 cars with 16 beams: the beams differ")
-    assert some.refusal(without).endswith("the beams differ")
+    assert reason.endswith(
+        "of 3 cars with 16 distance sensors: the numbers of distance sensors differ"
+    )
+    assert some.refusal(without).endswith("the numbers of distance sensors differ")
     with pytest.raises(EnvError, match="^proximity: expected a whole number from 0 to 32"):
         Layout("estimate", 3, 1, 33)
 

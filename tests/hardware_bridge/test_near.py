@@ -16,7 +16,7 @@ from hardware_bridge.ingest.rangefinder import LASTS, Near
 from hardware_bridge.readings import MICROSECONDS_32, NearReading, Source
 from hardware_bridge.wire.encoder import RelposEncoder
 from relpos_env.errors import EnvError
-from relpos_env.interface.beams import FARTHEST
+from relpos_env.interface.rangefinders import FARTHEST
 
 RING = EmulateOptions(scenario="cars-nlos", cars=3, proximity=8, seed=2, seconds=60.0)
 
@@ -35,18 +35,18 @@ def test_a_ring_goes_over_the_wire():
 
 def test_a_beam_tells_what_is_nearest_in_its_sector_for_a_while():
     near = Near(2, 4)
-    assert not near.beams(0).any()
+    assert not near.distances(0).any()
     near.take(0, 0.1, 2.0, 0)
     near.take(0, -0.6, 1.0, 0)  # the same sector, ahead
     near.take(0, math.pi / 2, None, 0)
     near.take(0, -math.pi / 2, 9.0, 0)
     near.take(5, 0.0, 1.0, 0)  # no such car
     near.take(0, math.nan, 1.0, 0)
-    assert near.beams(0)[0].tolist() == [1.0, FARTHEST, 0.0, FARTHEST]
+    assert near.distances(0)[0].tolist() == [1.0, FARTHEST, 0.0, FARTHEST]
     later = round(LASTS * 1e9)
     near.take(0, 0.0, 2.5, later + 1)
-    assert near.beams(later + 1)[0].tolist() == [2.5, 0.0, 0.0, 0.0]
-    assert not near.beams(later + 1)[1].any()
+    assert near.distances(later + 1)[0].tolist() == [2.5, 0.0, 0.0, 0.0]
+    assert not near.distances(later + 1)[1].any()
 
 
 def test_emulated_cars_see_what_simulated_ones_see():
@@ -65,10 +65,12 @@ def test_emulated_cars_see_what_simulated_ones_see():
 
 
 def test_policies_with_beams_drive_cars_that_have_them():
-    result = drive_on(lambda: VirtualBridge(RING), 3, n_beams=8, name="consensus", seconds=3.0)
+    result = drive_on(
+        lambda: VirtualBridge(RING), 3, n_rangefinders=8, name="consensus", seconds=3.0
+    )
     assert result.decisions == 30
     with pytest.raises(UsageError, match="hold-beams: expected 16 beams, the cars have 8"):
-        drive_on(lambda: VirtualBridge(RING), 3, n_beams=8, name="hold-beams", seconds=3.0)
+        drive_on(lambda: VirtualBridge(RING), 3, n_rangefinders=8, name="hold-beams", seconds=3.0)
 
 
 def test_a_number_of_beams_is_checked():

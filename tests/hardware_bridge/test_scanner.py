@@ -22,7 +22,7 @@ from hardware_bridge.links.ports import Chunk, PortSpec
 from hardware_bridge.links.serial_port import SerialPort
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.readings import UNNAMED, ScanReading
-from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
+from relpos_env.interface.rangefinders import FARTHEST, rangefinder_directions, rangefinder_origins
 
 TEXT = """
 calibration.uncalibrated = true
@@ -78,7 +78,7 @@ def test_the_distance_is_from_the_edge_of_the_body(bearing, distance, x, y, yaw)
         return
     assert not inside
     direction = np.array([[math.cos(seen[0]), math.sin(seen[0])]])
-    from_middle = seen[1] + beam_starts(direction, 0.21, 0.1)[0]
+    from_middle = seen[1] + rangefinder_origins(direction, 0.21, 0.1)[0]
     assert from_middle * complex(*direction[0]) == pytest.approx(point, abs=1e-9)
 
 
@@ -88,15 +88,15 @@ def test_beams_are_those_of_sensors_on_the_body():
     encoder = make_encoder("rplidar", "")
     for k in range(2):
         swarm.take(Chunk("links.scanner", k * 1000, encoder.encode(turn(MOUNT))))
-    directions = beam_directions(720)
+    directions = rangefinder_directions(720)
     walls = np.where(directions[:, 1] > 0.0, 1.0, 2.0) / np.maximum(np.abs(directions[:, 1]), 1e-9)
-    from_body = np.minimum(walls - beam_starts(directions, 0.21, 0.1), FARTHEST)
+    from_body = np.minimum(walls - rangefinder_origins(directions, 0.21, 0.1), FARTHEST)
     sectors = 90 * np.arange(8)[:, None] + np.arange(-45, 46)
     expected = from_body[sectors % 720].min(axis=1)
-    beams = swarm.intake.near.beams(1000)
-    assert beams[1] == pytest.approx(expected, abs=0.03)
-    assert not beams[0].any()  # the scanner is on the other car
-    assert not swarm.intake.near.beams(1001 + round(LASTS * 1e9)).any()
+    distances = swarm.intake.near.distances(1000)
+    assert distances[1] == pytest.approx(expected, abs=0.03)
+    assert not distances[0].any()  # the scanner is on the other car
+    assert not swarm.intake.near.distances(1001 + round(LASTS * 1e9)).any()
     assert not swarm.intake.received_ns  # a scanner does not report the position of its car
 
 
@@ -158,8 +158,8 @@ def test_beams_have_no_gaps_while_the_scanner_turns_slowly():
         distance = (1.0 if ahead else 2.9) + rng.normal(scale=0.005)
         near.take(0, bearing, distance, t_ns)
         if t_ns > 0.2e9:
-            assert near.beams(t_ns)[0, 0] == pytest.approx(1.0, abs=0.03)
-            assert near.beams(t_ns)[0, 4] == pytest.approx(2.9, abs=0.03)
+            assert near.distances(t_ns)[0, 0] == pytest.approx(1.0, abs=0.03)
+            assert near.distances(t_ns)[0, 4] == pytest.approx(2.9, abs=0.03)
 
 
 HERE = "node = 2\n"
@@ -179,7 +179,7 @@ HERE = "node = 2\n"
             'nodes.2.kind = "static"\nnodes.3.vehicle = "car"',
             "links.scanner.node: node 2 is static",
         ),
-        ("task.proximity = 8\n", "", "task.proximity: expected the number of beams"),
+        ("task.proximity = 8\n", "", "task.proximity: expected the number of distance sensors"),
         ('"1" = 2 }\n', '"1" = 2 }\nscanner.x = 0.1\n', "linktrack is no scanner, leave it out"),
     ],
 )

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from relpos_env.config import configure
 from relpos_env.core.env_core import EnvCore
 from relpos_env.errors import EnvError
-from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
+from relpos_env.interface.rangefinders import FARTHEST, rangefinder_directions, rangefinder_origins
 from relpos_env.scenarios import scenario
 from relpos_env.sensors._proximity_kernels import read_proximity
 from relpos_env.sensors.proximity import PROXIMITY, ProximitySimParams, fill_proximity
@@ -24,7 +24,9 @@ HALL = (500.0, 500.0)
 MIDDLE = [[0.0, 0.0, 0.0]]
 
 
-def read(cars, *, boxes=(), room=(3.0, 2.0), beams=16, params=EXACT, tick=1, seeds=(7,), gone=()):
+def read(
+    cars, *, boxes=(), room=(3.0, 2.0), n_rangefinders=16, params=EXACT, tick=1, seeds=(7,), gone=()
+):
     """Return readings of cars at (x, y, heading) in one room per seed; (env, car, sensor)."""
     e, n = len(seeds), len(cars)
     p = np.zeros(e, dtype=PROXIMITY)
@@ -35,10 +37,10 @@ def read(cars, *, boxes=(), room=(3.0, 2.0), beams=16, params=EXACT, tick=1, see
     present = np.ones((e, n), dtype=bool)
     present[:, list(gone)] = False
     rows = np.tile(np.array([box_row(*b) for b in boxes]).reshape(-1, 6), (e, 1, 1))
-    out = np.full((e, n, beams), np.nan)
+    out = np.full((e, n, n_rangefinders), np.nan)
     read_proximity(
-        as_records(p), np.array(seeds, dtype=np.uint64), np.full(e, tick), beam_directions(beams),
-        body, present, np.tile(SIZE, (e, 1)), np.tile(room, (e, 1)), rows, out,
+        as_records(p), np.array(seeds, dtype=np.uint64), np.full(e, tick),
+        rangefinder_directions(n_rangefinders), body, present, np.tile(SIZE, (e, 1)), np.tile(room, (e, 1)), rows, out,
     )  # fmt: skip
     return out
 
@@ -79,7 +81,7 @@ def in_cone(tip, angle, half, polygon):
     return best
 
 
-def twin(cars, boxes, room, beams, params):
+def twin(cars, boxes, room, n_rangefinders, params):
     """Return the readings of one environment without noise, as `read`."""
     w, d, t = *room, 10.0
     solids = [
@@ -88,12 +90,12 @@ def twin(cars, boxes, room, beams, params):
         *(corners(*b) for b in boxes),
     ]  # fmt: skip
     bodies = [corners(x, y, 2 * SIZE[0], 2 * SIZE[1], angle) for x, y, angle in cars]
-    starts = beam_starts(beam_directions(beams), *SIZE)
-    out = np.zeros((len(cars), beams))
+    starts = rangefinder_origins(rangefinder_directions(n_rangefinders), *SIZE)
+    out = np.zeros((len(cars), n_rangefinders))
     for n, (x, y, heading) in enumerate(cars):
         others = [*solids, *(body for m, body in enumerate(bodies) if m != n)]
         for b, start in enumerate(starts):
-            angle = heading + 2.0 * math.pi * b / beams
+            angle = heading + 2.0 * math.pi * b / n_rangefinders
             tip = np.array([x + start * math.cos(angle), y + start * math.sin(angle)])
             found = min(in_cone(tip, angle, 0.5 * params.cone, solid) for solid in others)
             out[n, b] = min(found, params.max_range)
@@ -118,19 +120,21 @@ def scene(seed):
     st.floats(0.01, 1.4),
     st.floats(0.2, FARTHEST),
 )
-def test_without_noise_it_is_the_twin(seed, beams, cone, most):
+def test_without_noise_it_is_the_twin(seed, n_rangefinders, cone, most):
     cars, boxes = scene(seed)
     params = ProximitySimParams(max_range=most, cone=cone, noise_std=0.0, noise_share=0.0)
-    got = read(cars, boxes=boxes, beams=beams, params=params)[0]
-    np.testing.assert_allclose(got, twin(cars, boxes, (3.0, 2.0), beams, params), atol=1e-9)
+    got = read(cars, boxes=boxes, n_rangefinders=n_rangefinders, params=params)[0]
+    np.testing.assert_allclose(
+        got, twin(cars, boxes, (3.0, 2.0), n_rangefinders, params), atol=1e-9
+    )
 
 
 @settings(max_examples=40)
 @given(st.integers(0, 2**32), st.integers(1, 32), st.floats(0.0, 1.0))
-def test_readings_are_within_reach(seed, beams, noise):
+def test_readings_are_within_reach(seed, n_rangefinders, noise):
     cars, boxes = scene(seed)
     params = ProximitySimParams(max_range=2.0, noise_std=noise)
-    got = read(cars, boxes=boxes, beams=beams, params=params, gone=(1,))[0]
+    got = read(cars, boxes=boxes, n_rangefinders=n_rangefinders, params=params, gone=(1,))[0]
     assert got.min() >= 0.0
     assert got.max() <= 2.0
     assert not got[1].any()
@@ -170,7 +174,7 @@ def test_a_quarter_turn_of_the_room_changes_nothing(seed):
 def test_a_wall_in_front(heading, cone):
     """The nearest side of the cone counts, from the edge of the body."""
     params = ProximitySimParams(cone=cone, noise_std=0.0, noise_share=0.0)
-    got = read([[9.0, 0.0, heading]], room=(10.0, 500.0), beams=1, params=params)[0, 0, 0]
+    got = read([[9.0, 0.0, heading]], room=(10.0, 500.0), n_rangefinders=1, params=params)[0, 0, 0]
     away = 1.0 - SIZE[0] * math.cos(heading)
     expected = min(away / math.cos(max(abs(heading) - 0.5 * cone, 0.0)), FARTHEST)
     assert got == pytest.approx(expected, rel=1e-12)
@@ -178,24 +182,26 @@ def test_a_wall_in_front(heading, cone):
 
 def test_beams_stand_round_the_car():
     """At 0, the clearance of each side; the first sensor points ahead, the next to the left."""
-    ahead, left, behind, right = read([[0.5, 0.25, 0.0]], beams=4)[0, 0]
+    ahead, left, behind, right = read([[0.5, 0.25, 0.0]], n_rangefinders=4)[0, 0]
     assert [ahead, left, behind, right] == pytest.approx([2.29, 1.65, 3.0, 2.15])
-    assert read(MIDDLE, room=HALL, beams=5).tolist() == [[[FARTHEST] * 5]]
-    assert read(MIDDLE, boxes=[(0.71, 0.0, 0.4, 0.4, 0.0)], beams=4)[0, 0, 0] == pytest.approx(0.3)
+    assert read(MIDDLE, room=HALL, n_rangefinders=5).tolist() == [[[FARTHEST] * 5]]
+    assert read(MIDDLE, boxes=[(0.71, 0.0, 0.4, 0.4, 0.0)], n_rangefinders=4)[
+        0, 0, 0
+    ] == pytest.approx(0.3)
 
 
 def test_other_cars_and_nobody_who_is_gone():
     cars = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5 * math.pi]]
-    assert read(cars, room=HALL, beams=4)[0, 0, 0] == pytest.approx(1.0 - 0.21 - 0.10)
-    assert read(cars, room=HALL, beams=4, gone=(1,))[0, 0].min() == FARTHEST
+    assert read(cars, room=HALL, n_rangefinders=4)[0, 0, 0] == pytest.approx(1.0 - 0.21 - 0.10)
+    assert read(cars, room=HALL, n_rangefinders=4, gone=(1,))[0, 0].min() == FARTHEST
     touching = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]
-    assert read(touching, room=HALL, beams=4)[0, 0, 0] == 0.0
+    assert read(touching, room=HALL, n_rangefinders=4)[0, 0, 0] == 0.0
 
 
 def test_noise():
     params = ProximitySimParams(noise_std=0.02, noise_share=0.03)
     x = np.array([
-        read(MIDDLE, room=(1.21, 1.6), beams=4, params=params, tick=k, seeds=range(20))
+        read(MIDDLE, room=(1.21, 1.6), n_rangefinders=4, params=params, tick=k, seeds=range(20))
         for k in range(300)
     ]).reshape(-1, 4)  # fmt: skip
     np.testing.assert_allclose(x.mean(axis=0), [1.0, 1.5, 1.0, 1.5], atol=0.003)
@@ -232,9 +238,9 @@ def drive(n_envs=1, steps=12, **arguments):
 @pytest.mark.parametrize("mode", ["estimate", "estimate_cov", "ranges", "truth"])
 def test_beams_change_nothing_else(mode):
     without, _ = drive(observation=mode)
-    with_beams, formation = drive(observation=mode, proximity=8)
-    assert with_beams[..., :-8].tobytes() == without.tobytes()
-    near = with_beams[..., -8:]
+    with_rangefinders, formation = drive(observation=mode, proximity=8)
+    assert with_rangefinders[..., :-8].tobytes() == without.tobytes()
+    near = with_rangefinders[..., -8:]
     assert near.tobytes() == near.clip(0.0, FARTHEST).tobytes()
     last = formation.parts.mode.fields[-1]
     assert (last.name, last.size, last.unit, last.limit, last.signed) == (

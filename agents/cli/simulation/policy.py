@@ -33,7 +33,7 @@ def list_policies(as_json: bool) -> None:
         click.echo("no policies come with this version; a file or a folder does as well")
         return
     rows = [[str(value) for value in _short(card).values()] for card in cards]
-    print_table("Policies", ["name", "observation", "cars", "history", "beams"], rows)
+    print_table("Policies", ["name", "observation", "cars", "history", "rangefinders"], rows)
 
 
 @policy.command("show")

@@ -66,7 +66,7 @@ def drive(
     return drive_on(
         open_bridge,
         swarm.n_slots,
-        n_beams=swarm.task.proximity,
+        n_rangefinders=swarm.task.proximity,
         name=name,
         observation=observation,
         arm=arm,
@@ -80,7 +80,7 @@ def drive_on(
     open_bridge: Callable[[], OpenBridge],
     n_slots: int,
     *,
-    n_beams: int = 0,
+    n_rangefinders: int = 0,
     name: str = CONTROLLER,
     observation: str | None = None,
     arm: bool = True,
@@ -93,7 +93,7 @@ def drive_on(
     Args:
         open_bridge: Opens the bridge.
         n_slots: Slots of its swarm.
-        n_beams: Distance sensors of each car.
+        n_rangefinders: Distance sensors of each car.
         name: Controller or policy, as for `drive`.
         observation: Observation mode, as for `drive`.
         arm: Whether the bridge arms the cars.
@@ -106,18 +106,18 @@ def drive_on(
         UsageError: As `drive`.
     """
     entry = find_entry(name)
-    if entry.proximity is not None and entry.proximity != n_beams:
+    if entry.proximity is not None and entry.proximity != n_rangefinders:
         raise UsageError(
-            f"{name}: expected {entry.proximity} beams, the cars have {n_beams}: see proximity of "
+            f"{name}: expected {entry.proximity} distance sensors, the cars have {n_rangefinders}: see proximity of "
             "[task]"
         )
     seen = observation or entry.trained_on or "estimate"
     if seen == "truth":
         raise UsageError("observation: real cars know no truth, expected estimate")
-    reason = entry.refusal(seen, n_slots, n_beams)
+    reason = entry.refusal(seen, n_slots, n_rangefinders)
     if reason is not None:
         raise UsageError(f"{name}: {reason}")
-    driver = entry.driver(seen, n_slots, n_beams)
+    driver = entry.driver(seen, n_slots, n_rangefinders)
     cycles = MOST_CYCLES if seconds is None else round(seconds / DECISION)
     with closing(open_bridge()) as bridge:
         env = bridge.env(observation=seen, history=entry.history, max_cycles=cycles)

@@ -15,7 +15,7 @@ from hardware_bridge.readings import ImuReading
 from hardware_bridge.wire.key import KEY_BYTES
 from relpos_env.config import FormationConfig, Parts, whole_number
 from relpos_env.errors import EnvError
-from relpos_env.interface.beams import MOST_BEAMS
+from relpos_env.interface.rangefinders import MAX_RANGEFINDERS
 from relpos_env.scenarios import Scenario
 from relpos_env.timing import DECISION
 
@@ -74,7 +74,7 @@ class EmulateOptions:
             object.__setattr__(self, "driver_options", SLOW_PWM)
         if not DECISION <= self.seconds <= LONGEST:
             raise EnvError(f"seconds: expected {DECISION:g} to {LONGEST:g}, got {self.seconds!r}")
-        whole_number("proximity", self.proximity, 0, MOST_BEAMS)
+        whole_number("proximity", self.proximity, 0, MAX_RANGEFINDERS)
         whole_number("seed", self.seed, 0, (1 << 63) - 1)
         if self.key is not None and len(self.key) != KEY_BYTES:
             raise BridgeError(f"key: expected {KEY_BYTES} bytes, got {len(self.key)}")

@@ -129,7 +129,7 @@ class EmulatedWorld:
         return speed, steering
 
     def near(self) -> F64:
-        """Return the readings of the distance sensors, (car, beam) [m]."""
+        """Return the readings of the distance sensors, (car, sensor) [m]."""
         near: F64 = self._swarm.proximity[0]
         return near
 

@@ -72,7 +72,7 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         self._keep("own", own)
         self._keep("mask", where.newest["mask"])
         self._keep("has_target", where.newest["has_target"])
-        self._has_places, self._has_beams = where.places is not None, where.near is not None
+        self._has_places, self._has_rangefinders = where.places is not None, where.near is not None
         self.skips_absent = True
         """True if other cars with zero weight are skipped, which only affects the run time."""
         if where.near is not None:
@@ -105,7 +105,7 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         count = weight.sum(dim=1, keepdim=True)
         mean = self._sum_of(others, weight) / count.clamp(min=1.0)
         own = scaled.index_select(1, self._own)
-        if self._has_beams:
+        if self._has_rangefinders:
             near = seen.index_select(1, self._near)
             own = torch.cat([own, (1.0 - near / CLOSE).clamp(0.0, 1.0)], dim=-1)
         return torch.cat([mean, self.of_own(own), 0.2 * count], dim=-1)

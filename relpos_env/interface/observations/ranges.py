@@ -16,7 +16,7 @@ class Ranges:
 
     needs_truth = False
 
-    def __init__(self, n_cars: int, n_beams: int = 0) -> None:
+    def __init__(self, n_cars: int, n_rangefinders: int = 0) -> None:
         n = n_cars - 1
         self.fields = (
             Field(
@@ -34,7 +34,7 @@ class Ranges:
                 "gap", n, "dB", "received less first-path power of that range", LOUD, per_other=True
             ),
             *wish_fields(n),
-            *own_fields(n_beams),
+            *own_fields(n_rangefinders),
         )
 
     def bind(self, view: AgentView, out: F32) -> Callable[[], None]:

@@ -14,7 +14,9 @@ from tracking.kernels.jit import bind
 class RelativePositions:
     """Relative positions and velocities; zeros where the mask is 0."""
 
-    def __init__(self, n_cars: int, n_beams: int = 0, *, needs_truth: bool, with_cov: bool) -> None:
+    def __init__(
+        self, n_cars: int, n_rangefinders: int = 0, *, needs_truth: bool, with_cov: bool
+    ) -> None:
         self.needs_truth, self._with_cov = needs_truth, with_cov
         n = n_cars - 1
         certainty = (
@@ -64,7 +66,7 @@ class RelativePositions:
             Field("vel", 2 * n, "m/s", "its velocity relative to this car", FAST, per_other=True),
             *(certainty if with_cov else ()),
             *wish_fields(n),
-            *own_fields(n_beams),
+            *own_fields(n_rangefinders),
         )
 
     def bind(self, view: AgentView, out: F32) -> Callable[[], None]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from relpos_env.interface._observation_kernels import FAR, FAST
-from relpos_env.interface.beams import FARTHEST
 from relpos_env.interface.observations.base import Field
+from relpos_env.interface.rangefinders import FARTHEST
 
 
 def wish_fields(n_others: int) -> tuple[Field, ...]:
@@ -30,11 +30,11 @@ def wish_fields(n_others: int) -> tuple[Field, ...]:
     )
 
 
-def own_fields(n_beams: int) -> tuple[Field, ...]:
+def own_fields(n_rangefinders: int) -> tuple[Field, ...]:
     """Return the fields of the command, the car's own motion and its distance sensors."""
     near = Field(
         "near",
-        n_beams,
+        n_rangefinders,
         "m",
         "distance to what is nearest: straight ahead, then counter-clockwise",
         FARTHEST,
@@ -44,5 +44,5 @@ def own_fields(n_beams: int) -> tuple[Field, ...]:
         Field("command", 2, "m/s", "velocity asked by the operator: forward, left", FAST),
         Field("heading", 2, "-", "cosine and sine of the own heading; zeros if unknown", 1.0),
         Field("motion", 2, "m/s, rad", "own speed and steering angle", FAST),
-        *((near,) if n_beams else ()),
+        *((near,) if n_rangefinders else ()),
     )

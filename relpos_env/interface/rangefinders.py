@@ -12,20 +12,20 @@ import numpy as np
 
 from tracking.arrays import F64
 
-MOST_BEAMS = 32
+MAX_RANGEFINDERS = 32
 """[-] Maximum number of distance sensors per car."""
 FARTHEST = 3.0
 """[m] Maximum range of distance sensors, and limit of their observations."""
 
 
-def beam_directions(n_beams: int) -> F64:
+def rangefinder_directions(n_rangefinders: int) -> F64:
     """Return the ray directions in the body frame, forward and left, (ray, 2)."""
-    angles = 2.0 * pi * np.arange(n_beams) / max(n_beams, 1)
+    angles = 2.0 * pi * np.arange(n_rangefinders) / max(n_rangefinders, 1)
     directions: F64 = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return directions
 
 
-def beam_starts(directions: F64, half_length: float, half_width: float) -> F64:
+def rangefinder_origins(directions: F64, half_length: float, half_width: float) -> F64:
     """Return the distances from the middle of a car to the edge of its body, (ray) [m].
 
     Args:

@@ -25,8 +25,8 @@ from agents.controllers.surroundings import (
 )
 from relpos_env.config import configure
 from relpos_env.core.env_core import EnvCore
-from relpos_env.interface.beams import FARTHEST, beam_directions, beam_starts
 from relpos_env.interface.observations import observation_mode, total_size
+from relpos_env.interface.rangefinders import FARTHEST, rangefinder_directions, rangefinder_origins
 
 PARAMS = ClearanceParams()
 READABLE = [(name, mode) for name, builder in CONTROLLERS.items() for mode in builder.observations]
@@ -47,10 +47,10 @@ def see(near, **values):
     return Reader(fields, "", ("estimate",)).read(o)
 
 
-def wall(normal, away, beams):
+def wall(normal, away, n_rangefinders):
     """Return readings of a wall in a direction at a distance from the centre of the car."""
-    directions = beam_directions(beams)
-    starts = beam_starts(directions, HALF_LENGTH, HALF_WIDTH)
+    directions = rangefinder_directions(n_rangefinders)
+    starts = rangefinder_origins(directions, HALF_LENGTH, HALF_WIDTH)
     angles = np.arctan2(directions[:, 1], directions[:, 0]) - normal
     off = np.abs((angles + np.pi) % (2.0 * np.pi) - np.pi)
     left = away - starts * np.cos(off)
@@ -58,14 +58,16 @@ def wall(normal, away, beams):
     return np.where(best > 1e-6, np.minimum(left / np.maximum(best, 1e-6), FARTHEST), FARTHEST)
 
 
-@pytest.mark.parametrize("beams", [8, 16, 24])
+@pytest.mark.parametrize("n_rangefinders", [8, 16, 24])
 @pytest.mark.parametrize("normal", np.linspace(-3.0, 3.0, 13))
-def test_points_are_on_the_wall(beams, normal):
+def test_points_are_on_the_wall(n_rangefinders, normal):
     """The three sensors that point most directly at it are within 3 cm."""
-    near = wall(normal, 0.6, beams)
+    near = wall(normal, 0.6, n_rangefinders)
     around = surroundings(see(near))
     ways = around.ahead * math.cos(normal) + around.left * math.sin(normal)
-    np.testing.assert_allclose(ways[np.argsort(near)[:3]], 0.6, atol=0.03 if beams > 8 else 0.07)
+    np.testing.assert_allclose(
+        ways[np.argsort(near)[:3]], 0.6, atol=0.03 if n_rangefinders > 8 else 0.07
+    )
 
 
 def test_what_a_known_car_explains_is_no_wall():
@@ -162,8 +164,8 @@ def test_one_car_or_many_and_whatever_is_seen(name, mode):
 def test_hardly_anybody_touches_anything():
     """In this room cars without sensors touch the wall ten times a minute."""
     touched = []
-    for beams in (0, 16):
-        parts = configure({"task": "hold", "scenario": "ring-nlos", "proximity": beams})
+    for n_rangefinders in (0, 16):
+        parts = configure({"task": "hold", "scenario": "ring-nlos", "proximity": n_rangefinders})
         formation = EnvCore(parts, 6)
         for e in range(6):
             formation.seed(e, seeding.np_random(e)[0])
