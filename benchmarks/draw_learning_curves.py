@@ -1,6 +1,6 @@
 """Learning curves of training runs: records in one file, and a figure of that file.
 
-python benchmarks/draw_learning_curves.py RUN ...    collects legs.jsonl of the runs, then draws
+python benchmarks/draw_learning_curves.py RUN ...    collects intervals.jsonl of runs, then draws
 python benchmarks/draw_learning_curves.py            draws results/learning-curves.jsonl again
 """
 

@@ -33,7 +33,7 @@ from typing import Any
 ROOT = Path(__file__).parent.parent
 TESTS = ROOT / "tests" / "hardware_bridge"
 KB = 1024.0
-NAP, STOOD = 0.002, 0.01
+NAP, STALL = 0.002, 0.01
 """[s] Sleep of the watching processes; time between two wake-ups above which a core stalled."""
 NUMBERS = ("t", "missed", "late_decisions")
 """Fields of a row that are not the memory of a process."""
@@ -60,14 +60,14 @@ def watch_core(core: int, talk: Connection) -> None:
     ctypes.CDLL(None).mlockall(3)  # MCL_CURRENT | MCL_FUTURE
     gc.disable()
     last = time.monotonic()
-    stood = []
+    stalls = []
     while not talk.poll():
         time.sleep(NAP)
         now = time.monotonic()
-        if now - last > STOOD:
-            stood.append((now, round(1e3 * (now - last - NAP), 1)))
+        if now - last > STALL:
+            stalls.append((now, round(1e3 * (now - last - NAP), 1)))
         last = now
-    talk.send(stood)
+    talk.send(stalls)
 
 
 class Watch:
@@ -145,7 +145,7 @@ def real(seconds: float, cars: int, scenario: str) -> None:
                 rows.append(row)
                 print(json.dumps(row), flush=True)
             _arm_again(drive, said)
-        print(json.dumps(_stood(watch.end(), said["misses"], begin)))
+        print(json.dumps(_stalls(watch.end(), said["misses"], begin)))
     finally:
         watch.close()
         if drive.poll() is None:
@@ -161,19 +161,19 @@ def real(seconds: float, cars: int, scenario: str) -> None:
     print(json.dumps(said.get("summary", said)))
 
 
-def _stood(
-    stood: list[list[tuple[float, float]]], misses: list[float], begin: float
+def _stalls(
+    stalls: list[list[tuple[float, float]]], misses: list[float], begin: float
 ) -> dict[str, Any]:
     """Return number and length of the stalls of each core, and those before each missed tick."""
     return {
-        "cores_stood_20_ms": [sum(ms > 20.0 for _, ms in core) for core in stood],
-        "longest_ms": [max((ms for _, ms in core), default=0.0) for core in stood],
+        "cores_stalled_20_ms": [sum(ms > 20.0 for _, ms in core) for core in stalls],
+        "longest_ms": [max((ms for _, ms in core), default=0.0) for core in stalls],
         "missed_at_s_beside_longest_ms": [
             [
                 round(t - begin, 1),
                 [
                     max((ms for s, ms in core if 0.0 <= t - s < REPORT_DELAY), default=0.0)
-                    for core in stood
+                    for core in stalls
                 ],
             ]
             for t in misses

@@ -108,8 +108,8 @@ def make_mover(rng: np.random.Generator, *, flies: bool) -> Mover:
         height = rng.normal(1.1, 0.15) if rng.random() < 0.8 else rng.uniform(0.4, 2.0)
         place[2] = np.clip(place[2], 0.3, 2.8) if flies else height
         places.append(place)
-    lean, swing = (0.1, 0.05) if flies else (0.5, 0.2)
-    held, yaw = rng.normal(0.0, lean, 2), rng.uniform(-np.pi, np.pi)
+    tilt_std, swing = (0.1, 0.05) if flies else (0.5, 0.2)
+    held, yaw = rng.normal(0.0, tilt_std, 2), rng.uniform(-np.pi, np.pi)
     angles = [np.array([yaw, 0.0, 0.0])] * (t.index(next(x for x in t if x > rest)) + 1)
     while len(angles) < len(t):
         yaw += rng.normal(0.0, 0.6)

@@ -37,7 +37,7 @@ def load(path):
 
 
 def simulate(channel, distance, nlos, seconds=0.5, seed=0):
-    """Two nodes that stand, in each place in an environment of its own.
+    """Simulate two static nodes at each place, one environment per place.
 
     Returns:
         Place, time [s] and the three quantities of every range.

@@ -1,4 +1,4 @@
-"""Four cars circle a wall; a picture of the room and of what one car's tracker believes.
+"""Four cars circle a wall; a picture of the room and of the estimates of one car's tracker.
 
 python examples/draw_a_scene.py [scene.png]
 """

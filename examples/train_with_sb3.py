@@ -18,5 +18,7 @@ for _ in range(50):
     actions, _ = model.predict(observations, deterministic=True)
     observations, reward, dones, infos = envs.step(actions)
     rewards.append(reward)
-print(f"{envs.num_envs} seats, {model.num_timesteps} steps, mean reward {np.mean(rewards):.2f}")
+print(
+    f"{envs.num_envs} agent slots, {model.num_timesteps} steps, mean reward {np.mean(rewards):.2f}"
+)
 envs.close()

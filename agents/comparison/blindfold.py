@@ -6,9 +6,9 @@ import numpy as np
 
 from agents.policies.layout import Layout
 from relpos_env.interface.observations.base import F32
-from relpos_env.interface.observations.standard_fields import own_fields, wish_fields
+from relpos_env.interface.observations.standard_fields import own_fields, target_fields
 
-KEPT = {f.name for f in (*wish_fields(1), *own_fields(1))}
+KEPT = {f.name for f in (*target_fields(1), *own_fields(1))}
 """Names of the fields of targets and of the car's own state."""
 
 

@@ -38,7 +38,7 @@ class Driven:
     @property
     def present(self) -> Bool:
         """True for cars that are received, (1, car)."""
-        return self._group.believed.present
+        return self._group.estimated.present
 
     @property
     def speed(self) -> F64:

@@ -79,7 +79,9 @@ def compare_hardware(
         seconds=seconds,
         settle=settle,
     )
-    seats, notes = _seat(each_once("NAME", drivers), modes(observations), config)
+    candidates, notes = _compatible_candidates(
+        each_once("NAME", drivers), modes(observations), config
+    )
     orders, remarks = _Orders(), []
 
     def opened() -> OpenBridge:
@@ -87,17 +89,17 @@ def compare_hardware(
 
     with closing((open_bridge or opened)()) as bridge:
         orders.attend_to(bridge, attend)
-        for seat in seats:
-            seat.warm_up(bridge)
+        for candidate in candidates:
+            candidate.warm_up(bridge)
         try:
             for k in range(episodes):
-                _drive_round(bridge, setting, seats, k, orders)
+                _drive_round(bridge, setting, candidates, k, orders)
                 if progress is not None:
                     progress((k + 1) / episodes)
         except KeyboardInterrupt:
             remarks.append("Interrupted")
         except BridgeError as error:
-            if not all(seat.rounds for seat in seats):
+            if not all(candidate.rounds for candidate in candidates):
                 raise
             remarks.append(f"Ended early: {error}")
         finally:
@@ -106,11 +108,11 @@ def compare_hardware(
             except BridgeError as error:
                 remarks.append(str(error))
         remarks += [text for _, text in bridge.feed.notices if STOPPED in text]
-    rounds = min(len(seat.rounds) for seat in seats)
+    rounds = min(len(candidate.rounds) for candidate in candidates)
     if rounds == 0:
         raise UsageError("nothing compared: it ended before every driver had driven once")
     return CompareResult(
-        rows=tuple(seat.row(config, setting, rounds) for seat in seats),
+        rows=tuple(candidate.row(config, setting, rounds) for candidate in candidates),
         notes=tuple(notes),
         remarks=tuple(remarks),
         first_seed=1,
@@ -120,7 +122,7 @@ def compare_hardware(
 
 
 @dataclass(slots=True)
-class _Seat:
+class _Candidate:
     """A compatible candidate and its episodes."""
 
     contender: Contender
@@ -179,23 +181,25 @@ class _Orders:
 
 
 def _drive_round(
-    bridge: OpenBridge, setting: Setting, seats: Sequence[_Seat], k: int, orders: _Orders
+    bridge: OpenBridge, setting: Setting, candidates: Sequence[_Candidate], k: int, orders: _Orders
 ) -> None:
     """Run one episode of every candidate."""
-    first = k % len(seats)
-    for seat in (*seats[first:], *seats[:first]):
-        driven = Driven(seat.env(bridge, setting.cycles), setting.cycles)
+    first = k % len(candidates)
+    for candidate in (*candidates[first:], *candidates[:first]):
+        driven = Driven(candidate.env(bridge, setting.cycles), setting.cycles)
         try:
-            seat.rounds += measure(driven, seat.driver, [k + 1], setting.first_scored, orders.check)
+            candidate.rounds += measure(
+                driven, candidate.driver, [k + 1], setting.first_scored, orders.check
+            )
         finally:
             driven.close()
 
 
-def _seat(
+def _compatible_candidates(
     drivers: Sequence[str], observations: Sequence[str], config: SwarmConfig
-) -> tuple[list[_Seat], list[str]]:
+) -> tuple[list[_Candidate], list[str]]:
     """Return the candidates that are compatible with the cars, and notes on the others."""
-    seats, notes = [], []
+    candidates, notes = [], []
     n_rangefinders = config.task.proximity
     for contender in line_up(drivers, observations, n_rangefinders):
         entry = find_entry(contender.name)
@@ -209,7 +213,7 @@ def _seat(
             notes.append(f"{contender.label} in {config.name}: {why}")
             continue
         driver = entry.driver(contender.observation, config.n_slots, n_rangefinders)
-        seats.append(_Seat(contender, entry.trained_on, entry.history, driver))
-    if not seats:
+        candidates.append(_Candidate(contender, entry.trained_on, entry.history, driver))
+    if not candidates:
         raise UsageError("NAME: nothing to compare: " + "; ".join(notes))
-    return seats, notes
+    return candidates, notes

@@ -80,7 +80,7 @@ def drive(
         avoidance: Parameters that the bounds were computed with.
     """
     speed = length(velocity)
-    stands = speed < np.where(np.abs(sight.speed) < ROLLING, params.start, params.stop)
+    stops = speed < np.where(np.abs(sight.speed) < ROLLING, params.start, params.stop)
     inverse = 1.0 / np.maximum(speed, TINY)
     direction = _turned(sight, (velocity[0] * inverse, velocity[1] * inverse), params)
     c, s = direction
@@ -95,10 +95,10 @@ def drive(
     rolls, angle = shunt(sight, speed, direction, (rolls, angle), params.wheelbase, params.shunting)
     rolls, angle = back_out(sight, (rolls, angle), params.freeing)
 
-    rolls = bounded_speed(np.where(stands, 0.0, rolls), bounds, avoidance)
+    rolls = bounded_speed(np.where(stops, 0.0, rolls), bounds, avoidance)
     actions = np.empty((*speed.shape, 2), np.float32)
     actions[..., 0] = np.minimum(np.maximum(rolls / MAX_SPEED, -1.0), 1.0)
-    actions[..., 1] = np.where(stands, 0.0, angle / MAX_STEERING)
+    actions[..., 1] = np.where(stops, 0.0, angle / MAX_STEERING)
     return actions
 
 

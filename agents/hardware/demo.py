@@ -61,14 +61,14 @@ class HardwareDemoResult:
     def summary(self) -> dict[str, Any]:
         """Figures of the comparison as a JSON record."""
         error = _settled(self.error[self.t >= SETTLE], self.error)
-        twin = _settled(self.simulated[round(SETTLE / DECISION) :], self.simulated)
+        simulated = _settled(self.simulated[round(SETTLE / DECISION) :], self.simulated)
         return {
             **self.drive.summary,
             "result": "hardware-demo",
             "seed": self.seed,
             "formation_error": error,
-            "simulated_error": twin,
-            "ratio": None if error is None or twin is None else error / twin,
+            "simulated_error": simulated,
+            "ratio": None if error is None or simulated is None else error / simulated,
             "collisions": self.collisions,
             "simulated_collisions": self.simulated_collisions,
             "late_steps": self.late_steps,
@@ -131,7 +131,7 @@ def hardware_demo(
         operator=float(options.operator),
         seconds=options.seconds,
     )
-    twin = run_episodes(contender, setting, [options.seed])[0]
+    simulated = run_episodes(contender, setting, [options.seed])[0]
     if virtual:
         drove = _drive_virtually(options, name, progress)
     else:
@@ -145,10 +145,10 @@ def hardware_demo(
         log=log,
         t=t - t[0] + DECISION if len(t) else t,
         error=true_error(result, log, t),
-        simulated=twin.error,
+        simulated=simulated.error,
         boxes=EmulatedWorld(options.parts(), options.seed).swarm.boxes[0].copy(),
         collisions=drove.collisions,
-        simulated_collisions=round(twin.collisions_per_min * twin.seconds / 60.0),
+        simulated_collisions=round(simulated.collisions_per_min * simulated.seconds / 60.0),
         late_steps=drove.late_steps,
         virtual=virtual,
     )

@@ -43,13 +43,13 @@ def _measure(phy: str, n: int, rng: np.random.Generator) -> dict[str, Any]:
     for k in range(n):
         group.switch_on(k, float(rng.uniform(0.0, 0.05)))
     group.assemble(range(n), limit=120.0)
-    assembled, law = group.t, round_rate(PHYS[phy], n)
-    group.run(max(5.0 / law, 1.5))  # until clocks are estimated, tables full, IDs checked
+    assembled, model_hz = group.t, round_rate(PHYS[phy], n)
+    group.run(max(5.0 / model_hz, 1.5))  # until clocks are estimated, tables full, IDs checked
     group.listen()
     group.air.events.clear()
-    group.run(max(6.0 / law, min(2.0, 100.0 / law)))
+    group.run(max(6.0 / model_hz, min(2.0, 100.0 / model_hz)))
     requests = [h.start for h in group.listen() if h.frame.type is Type.REQUEST]
-    requests = [t for k, t in enumerate(requests) if k == 0 or t - requests[k - 1] > 0.5 / law]
+    requests = [t for k, t in enumerate(requests) if k == 0 or t - requests[k - 1] > 0.5 / model_hz]
     hz = (len(requests) - 1) / (requests[-1] - requests[0])
     between = [
         output
@@ -63,7 +63,7 @@ def _measure(phy: str, n: int, rng: np.random.Generator) -> dict[str, Any]:
         "n": n,
         "rounds_hz": hz,
         "paper_hz": PAPER_HZ.get((phy, n)),
-        "law_hz": law,
+        "model_hz": model_hz,
         "complete": len(between) / pairs / n,
         "assembled_s": assembled,
     }

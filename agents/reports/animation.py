@@ -10,9 +10,10 @@ _SCRIPT = """
 <canvas width="1000" height="720"></canvas>
 <div class="bar"><button>pause</button><select></select><input type="range" min="0" value="0">
 <span></span></div>
-<p class="key">Filled cars are true. Dashed outlines are where the tracker of the first car believes
-the others to be, with ellipses of two standard deviations. Lines between cars: green in sight,
-orange behind an obstacle. Crosses mark the target formation around the first car.</p>
+<p class="key">Filled cars are true. Dashed outlines are the positions of the others
+estimated by the tracker of the first car, with ellipses of two standard deviations.
+Lines between cars: green in sight, orange behind an obstacle. Crosses mark the target formation
+around the first car.</p>
 <script>
 (() => {
 const drives = __DATA__, me = document.currentScript.parentElement;

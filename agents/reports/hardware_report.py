@@ -90,7 +90,7 @@ def drive_figure(result: HardwareDemoResult, room: tuple[float, float]) -> Figur
     errors.plot(result.t, result.error, color="C0", label="through the bridge")
     t = DECISION * np.arange(1, len(result.simulated) + 1)
     errors.plot(t, result.simulated, color="0.5", label="simulator")
-    errors.plot(result.t, result.drive.error, color="C2", lw=0.8, label="what the cars believe")
+    errors.plot(result.t, result.drive.error, color="C2", lw=0.8, label="estimated by the cars")
     errors.set(xlabel="t [s]", ylabel="formation error [m]", ylim=(0, None))
     errors.legend()
     return figure

@@ -146,7 +146,7 @@ def _rates(result: ProtocolResult) -> Figure:
     for phy, colour in (("110k", "C0"), ("6M8", "C1")):
         rows = [r for r in result.rates if r["phy"] == phy]
         n = [r["n"] for r in rows]
-        ax.plot(n, [r["law_hz"] for r in rows], color=colour, lw=1, label=f"{phy}, airtime")
+        ax.plot(n, [r["model_hz"] for r in rows], color=colour, lw=1, label=f"{phy}, airtime")
         ax.plot(n, [r["rounds_hz"] for r in rows], "o", color=colour, label=f"{phy}, measured")
         paper = [(r["n"], r["paper_hz"]) for r in rows if r["paper_hz"] is not None]
         if paper:

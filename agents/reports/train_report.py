@@ -33,7 +33,7 @@ def train_report(config: TrainConfig, rows: Rows, choice: Choice) -> str:
     page = Page(
         f"Training: {env.task} on {env.observation}",
         f"{last['frames']:,} frames in {last['seconds'] / 60.0:.1f} minutes, "
-        f"{_seeds(seeds)}; kept: seed {kept['seed']} after leg {kept['leg']}",
+        f"{_seeds(seeds)}; kept: seed {kept['seed']} after interval {kept['interval']}",
     )
     page.heading("Learning curves")
     page.figure(
@@ -43,23 +43,23 @@ def train_report(config: TrainConfig, rows: Rows, choice: Choice) -> str:
                 for s in seeds
             ]
         ),
-        f"{config.eval_episodes} episodes in {', '.join(env.scenarios)} after every leg, the same "
-        "every time, driven by the most likely action; errors from 10 s on.",
+        f"{config.eval_episodes} episodes in {', '.join(env.scenarios)} after every interval, the "
+        "same every time, driven by the most likely action; errors from 10 s on.",
     )
     page.heading("The choice")
     page.table(
-        ["seed", "leg", "return", "formation [m]", "tracking [m]", "collisions/min"],
-        [[str(r["seed"]), str(r["leg"]), *_measured(r)] for r in choice.rows],
+        ["seed", "interval", "return", "formation [m]", "tracking [m]", "collisions/min"],
+        [[str(r["seed"]), str(r["interval"]), *_measured(r)] for r in choice.rows],
     )
     page.text(
         f"The policy with the highest return in {config.choice_episodes} other episodes is kept, "
         "among the best by the curves and the last of every run."
     )
-    page.heading("Legs")
+    page.heading("Evaluation intervals")
     page.table(
         [
             "seed",
-            "leg",
+            "interval",
             "frames",
             "level",
             "return",
@@ -70,7 +70,7 @@ def train_report(config: TrainConfig, rows: Rows, choice: Choice) -> str:
         [
             [
                 str(r["seed"]),
-                str(r["leg"]),
+                str(r["interval"]),
                 f"{r['frames']:,}",
                 "-" if r["level"] is None else str(r["level"]),
                 *_measured(r),

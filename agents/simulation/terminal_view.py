@@ -129,7 +129,7 @@ class LiveRoom:
         if error is not None:
             text += f", tracking error {error:.2f} m"
         panel = Panel(room, title=title, expand=False, padding=0, safe_box=plain)
-        key = "o: where the first car believes another, +: where it wants it"
+        key = "o: estimate of another car by the first, +: its target"
         self._live.update(Group(panel, Text(f"{text}\n{key}")), refresh=True)
 
     def replay(self, frames: dict[str, Any], title: str, until: Callable[[], bool]) -> None:

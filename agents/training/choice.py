@@ -55,18 +55,22 @@ def choose(config: TrainConfig, runs: Sequence[Path]) -> Choice:
     found: list[Choice] = []
     rows: list[dict[str, Any]] = []
     for path in runs:
-        run, legs = RunFolder(path), set()
+        run, intervals = RunFolder(path), set()
         for name in (BEST, LAST):
             loaded = run.load(name)
             if loaded is None:
                 raise UsageError(f"{path}: expected {name} of a finished run, found none")
             tensors, progress = loaded
             row = progress.log[-1]
-            if row["leg"] in legs:
+            if row["interval"] in intervals:
                 continue
-            legs.add(row["leg"])
+            intervals.add(row["interval"])
             restore_weights(policy, tensors)
-            entry = {"seed": run.config().seed, "leg": row["leg"], "frames": row["frames"]}
+            entry = {
+                "seed": run.config().seed,
+                "interval": row["interval"],
+                "frames": row["frames"],
+            }
             rows.append(entry | evaluation.run(policy))
             found.append(Choice(run=path, weights=name, measured=rows[-1], rows=rows))
     evaluation.close()

@@ -9,7 +9,7 @@ from agents.settings import number
 
 MOST_SEED = 2147483647
 """Largest seed (31 bits)."""
-FORMAT = 10
+FORMAT = 11
 """Version of the run folder; other versions are refused."""
 
 
@@ -107,7 +107,7 @@ class TrainConfig:
     and shape must be those of the run. Only the critic is trained in the first 10 % of the run."""
     seed: int = number(0, 0, MOST_SEED)
     """Seed; reproduces weights bit for bit on one machine with equal versions and threads."""
-    leg: int = number(40, 1, 10000)
+    eval_interval: int = number(40, 1, 10000)
     """Updates per evaluation interval, which begins with new episodes."""
     threads: int = number(2, 1, 256)
     """Threads for simulation and learning, divided among the runs."""

@@ -85,7 +85,7 @@ def export_policy(
         "scenario": config.env.scenarios[0],
         "seed": config.seed,
         "frames": measured["frames"],
-        "leg": measured["leg"],
+        "interval": measured["interval"],
         "config": to_json(config),
         "measured": measured,
         "chosen_by": None if chosen is None else chosen.measured,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-COUNTED = ("leg", "frames", "seconds", "return")
+COUNTED = ("interval", "frames", "seconds", "return")
 """Numbers that every record needs so that the run can be resumed."""
 
 
@@ -28,16 +28,16 @@ class Progress:
         found = json.loads(text)
         log = found.get("log") if isinstance(found, dict) else None
         if not isinstance(log, list) or not log:
-            raise ValueError("progress: expected a log of at least one leg")
+            raise ValueError("progress: expected a log of at least one interval")
         for k, row in enumerate(log):
             for name in COUNTED:
                 value = row.get(name) if isinstance(row, dict) else None
                 if isinstance(value, bool) or not isinstance(value, int | float):
-                    raise ValueError(f"progress: leg {k}: expected a number as {name!r}")
+                    raise ValueError(f"progress: interval {k}: expected a number as {name!r}")
         return cls(log=log)
 
     @property
-    def legs(self) -> int:
+    def n_intervals(self) -> int:
         """Number of finished evaluation intervals."""
         return len(self.log)
 
@@ -52,15 +52,15 @@ class Progress:
         return float(self.log[-1]["seconds"]) if self.log else 0.0
 
     @property
-    def best_leg(self) -> int:
+    def best_interval(self) -> int:
         """Index of the evaluation interval with the highest return, the first of equals.
 
         Raises:
             ValueError: No evaluation interval is finished.
         """
-        return max(range(self.legs), key=lambda k: float(self.log[k]["return"]))
+        return max(range(self.n_intervals), key=lambda k: float(self.log[k]["return"]))
 
-    def after_leg(
+    def after_interval(
         self, frames: int, seconds: float, level: int | None, measured: Mapping[str, Any]
     ) -> Progress:
         """Return the progress after one more evaluation interval.
@@ -72,5 +72,5 @@ class Progress:
             measured: Evaluation of the policy, see `agents.training.evaluation`.
         """
         spent = round(self.seconds + seconds, 2)
-        row = {"leg": self.legs, "frames": frames, "seconds": spent, "level": level}
+        row = {"interval": self.n_intervals, "frames": frames, "seconds": spent, "level": level}
         return Progress(log=[*self.log, {**row, **measured}])

@@ -46,14 +46,14 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
         """
         self.parts = tuple(parts)
         self._reward_scale = np.float32(reward_scale)
-        self._views = [_SeatView(layout, part) for part in self.parts]
+        self._views = [_SlotView(layout, part) for part in self.parts]
         self._pool = ThreadPoolExecutor(threads)
         # Usually the slowest first: most agent slots, then later ones, whose rooms are larger.
         sizes = [(part.num_envs, k) for k, part in enumerate(self.parts)]
         self._longest_first = [k for _, k in sorted(sizes, reverse=True)]
         self._rng = np.random.default_rng(0)
         ends = np.cumsum([p.num_envs for p in parts])
-        self._seats = [slice(int(e) - p.num_envs, int(e)) for e, p in zip(ends, parts, strict=True)]
+        self._slots = [slice(int(e) - p.num_envs, int(e)) for e, p in zip(ends, parts, strict=True)]
         self.render_mode = None
         space = observation_space(layout, with_truth=parts[0].with_truth)
         super().__init__(int(ends[-1]), space, parts[0].action_space)
@@ -84,8 +84,8 @@ class MultiScenarioVecEnv(SharedAttributeVecEnv):
 
     def step_async(self, actions: F32) -> None:
         """Set the actions of all agent slots."""
-        for part, seats in zip(self.parts, self._seats, strict=True):
-            part.step_async(actions[seats])
+        for part, slots in zip(self.parts, self._slots, strict=True):
+            part.step_async(actions[slots])
 
     def step_wait(self) -> tuple[F32, F32, Bool, list[dict[str, Any]]]:
         """Run one control step in all environments."""
@@ -119,7 +119,7 @@ def observation_space(layout: Layout, *, with_truth: bool) -> Box:
     return Box(np.append(space.low, -more), np.append(space.high, more))
 
 
-class _SeatView:
+class _SlotView:
     """Observations of one part in the layout of the policy."""
 
     def __init__(self, layout: Layout, part: FormationVecEnv) -> None:

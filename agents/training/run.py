@@ -70,7 +70,7 @@ def train_policy(
     if config.runs == 1:
         folders = [folder]
         given = None if resumed else config
-        results = [train(given, folder, progress=lambda *leg: tell(0, *leg))]
+        results = [train(given, folder, progress=lambda *args: tell(0, *args))]
     else:
         if not resumed:
             check_environments(config)

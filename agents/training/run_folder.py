@@ -26,7 +26,7 @@ from agents.training.config import FORMAT, TrainConfig
 from agents.training.environments import layout_of
 from agents.training.progress import Progress
 
-CONFIG, LAST, BEST, LOG = "config.json", "last.safetensors", "best.safetensors", "legs.jsonl"
+CONFIG, LAST, BEST, LOG = "config.json", "last.safetensors", "best.safetensors", "intervals.jsonl"
 
 
 class RunFolder:

@@ -1,6 +1,6 @@
 """Training of one policy for all cars (`relpos train`).
 
-A run consists of evaluation intervals (`leg` in code and options). Each begins with new episodes
+A run consists of evaluation intervals. Each begins with new episodes
 and generators reseeded from the run's seed and the index of the interval, and ends with an
 evaluation and a checkpoint. A run resumed from a checkpoint is therefore identical to an
 uninterrupted one, and no state of simulations, generators or threads has to be stored.
@@ -24,7 +24,7 @@ from agents.training.begin import begin_with
 from agents.training.config import TrainConfig
 from agents.training.environments import check_environments, layout_of, make_rooms
 from agents.training.evaluation import Evaluation
-from agents.training.ppo.learner import level_of, make_model, make_policy, run_leg
+from agents.training.ppo.learner import level_of, make_model, make_policy, run_interval
 from agents.training.progress import Progress
 from agents.training.run_folder import RunFolder, restore, tensors_of
 
@@ -86,21 +86,21 @@ def train(
             learner = _Learner.begin(config, level, logger, tensors, state.frames, learner)
         with run.writing():
             try:
-                run_leg(learner.model, config, state.legs, tell)
+                run_interval(learner.model, config, state.n_intervals, tell)
             except ValueError as error:
                 # torch raises ValueError for distributions with NaN parameters.
                 if all(bool(p.isfinite().all()) for p in learner.model.policy.parameters()):
                     raise
                 raise UsageError(
-                    f"{folder}: diverged in leg {state.legs + 1}, its weights are no numbers any "
-                    "more: expected a smaller --learning-rate or --entropy"
+                    f"{folder}: diverged in interval {state.n_intervals + 1}, its weights are no "
+                    "numbers any more: expected a smaller --learning-rate or --entropy"
                 ) from error
         measured = evaluation.run(learner.model.policy)
-        state = state.after_leg(
+        state = state.after_interval(
             int(learner.model.num_timesteps), time.perf_counter() - began, level, measured
         )
         tensors = tensors_of(learner.model.policy, learner.model.policy.optimizer)
-        run.save(tensors, state, best=state.best_leg == state.legs - 1)
+        run.save(tensors, state, best=state.best_interval == state.n_intervals - 1)
         with run.writing():
             _note(logger, state)
         if progress is not None:

@@ -26,8 +26,8 @@ int board_read(uint8_t *byte);
 typedef struct {
     uint32_t time;            /* board_micros() when the sensor said that it was ready */
     float gyr[3];             /* [rad/s] x forward, y left, z up of the car, not of the chip */
-    float acc[3];             /* [m/s2] likewise; at rest +9.8 on z */
-    float mag[3];             /* [uT] likewise */
+    float acc[3];             /* [m/s2] same axes; at rest +9.8 on z */
+    float mag[3];             /* [uT] same axes */
     int has_mag;
 } board_sample;
 

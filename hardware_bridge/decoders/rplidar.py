@@ -66,7 +66,7 @@ class RplidarDecoder:
         kept, source = self._kept, Source()
         kept += data
         readings: list[Reading] = []
-        begin, at = 0, self._unbelieved * SAMPLE.size
+        begin, at = 0, self._n_unconfirmed * SAMPLE.size
         while at + SAMPLE.size <= len(kept):
             head, angle, distance = SAMPLE.unpack_from(kept, at)
             if self._follows(head, angle):
@@ -94,7 +94,7 @@ class RplidarDecoder:
         return readings
 
     @property
-    def _unbelieved(self) -> int:
+    def _n_unconfirmed(self) -> int:
         return 0 if self._n_run == LOCK else self._n_run
 
     def _follows(self, head: int, angle: int) -> bool:
@@ -107,10 +107,10 @@ class RplidarDecoder:
             step = self._turned = self._watched = 0
         self._watched += 1
         turned = self._turned + step
-        believed = self._n_run == LOCK
+        locked = self._n_run == LOCK
         if not -FARTHEST_BACK <= step <= FARTHEST_STEP:
             return False
-        if self._watched == (WATCH if believed else LOCK):
+        if self._watched == (WATCH if locked else LOCK):
             if turned < LEAST_TURN * self._watched // LOCK:
                 return False
             turned = self._watched = 0

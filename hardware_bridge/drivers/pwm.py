@@ -60,14 +60,14 @@ class PwmOptions:
         room = min(middle - LEAST_PULSE, MOST_PULSE - middle)
         expect(0 < abs(span) <= room, "steering_span", f"-{room} to {room} and not 0", span)
         expect(0.0 < self.max_steering <= 1.5, "max_steering", "0 to 1.5", self.max_steering)
-        stand = self.throttle_centre
-        expect(LEAST_PULSE < stand < MOST_PULSE, "throttle_centre", pulses, stand)
+        centre = self.throttle_centre
+        expect(LEAST_PULSE < centre < MOST_PULSE, "throttle_centre", pulses, centre)
         expect(len(self.forward) >= 2, "forward", "at least two points", self.forward)
-        side = 1 if self.forward[0][1] > stand else -1
-        _check_points("forward", self.forward, stand, side)
+        side = 1 if self.forward[0][1] > centre else -1
+        _check_points("forward", self.forward, centre, side)
         if self.reverse:
             expect(len(self.reverse) >= 2, "reverse", "no or at least two points", self.reverse)
-            _check_points("reverse", self.reverse, stand, -side)
+            _check_points("reverse", self.reverse, centre, -side)
 
 
 def _check_points(name: str, points: Points, centre: int, side: int) -> None:

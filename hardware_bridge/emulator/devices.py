@@ -43,15 +43,15 @@ def next_multiple(t: float, every: float) -> float:
 
 
 class NodeDevice:
-    """A node with its lines, and temporarily a twin: a second device with the same id."""
+    """A node with its lines, and temporarily a duplicate: a second device with the same id."""
 
     def __init__(
-        self, node: EmulatedNode, lines: Sequence[Line], make_twin: Callable[[], EmulatedNode]
+        self, node: EmulatedNode, lines: Sequence[Line], make_duplicate: Callable[[], EmulatedNode]
     ) -> None:
         self.node, self.lines = node, tuple(lines)
-        self._make_twin = make_twin
-        self._twin: EmulatedNode | None = None
-        self._twin_until = -np.inf
+        self._make_duplicate = make_duplicate
+        self._duplicate: EmulatedNode | None = None
+        self._duplicate_until = -np.inf
         self._powered = True
 
     def step(self, t: float, t_ns: int, rows: Sequence[Measured], powered: bool) -> None:
@@ -69,16 +69,16 @@ class NodeDevice:
         frames: list[list[bytes]] = [[] for _ in self.lines]
         if powered:
             frames = self.node.say(rows, t)
-        if self._twin is not None and t < self._twin_until:
-            for own, other in zip(frames, self._twin.say(at_rest(rows), t), strict=True):
+        if self._duplicate is not None and t < self._duplicate_until:
+            for own, other in zip(frames, self._duplicate.say(at_rest(rows), t), strict=True):
                 own += other
         for line, sent in zip(self.lines, frames, strict=True):
             line.replug_if_due(t)
             line.send(t_ns, sent)
 
-    def meet_twin(self, until: float) -> None:
+    def add_duplicate(self, until: float) -> None:
         """Add a second device with the same id to the lines until world time `until` [s]."""
-        self._twin, self._twin_until = self._make_twin(), until
+        self._duplicate, self._duplicate_until = self._make_duplicate(), until
 
 
 class CarDevice:

@@ -185,5 +185,5 @@ def _befall_node(device: NodeDevice, fault: Fault, t: float) -> None:
         device.node.stick(until)
     elif fault.kind == "silence":
         device.node.be_silent(until)
-    elif fault.kind == "twin":
-        device.meet_twin(until)
+    elif fault.kind == "duplicate-id":
+        device.add_duplicate(until)

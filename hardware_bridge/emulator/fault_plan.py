@@ -31,7 +31,7 @@ FAULT_KINDS: Mapping[str, tuple[str, ...]] = {
     "clock-step": (NODES,),
     "stuck-sensor": (NODES,),
     "silence": (NODES, CARS),
-    "twin": (NODES,),
+    "duplicate-id": (NODES,),
 }
 """Kinds of faults and the groups of targets that they apply to."""
 REBOOT = 1.0
@@ -49,7 +49,7 @@ class Fault:
     """``unplug``: the port is gone, and comes back with the same name. ``reboot``: silence, then
     the next boot number and a clock from 0; a car discards its command. ``clock-step``: the node's
     clock jumps. ``stuck-sensor``: the IMU repeats its last sample. ``silence``: the device works
-    but sends nothing. ``twin``: a second device sends with the same id on the same line."""
+    but sends nothing. ``duplicate-id``: a second device sends with the same id on the same line."""
     target: str
     """Target: ``nodes.1``, ``cars.1`` or a port, ``links.n1`` or ``links.operator``."""
     seconds: float = REBOOT

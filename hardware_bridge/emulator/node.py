@@ -27,7 +27,7 @@ from hardware_bridge.readings import (
 from tracking.measurements import Kind
 
 GRAVITY = 9.81
-"""[m/s2] Specific force of a twin at rest."""
+"""[m/s2] Specific force of a duplicate at rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,6 +160,6 @@ class EmulatedNode:
 
 
 def at_rest(rows: Sequence[Measured]) -> list[Measured]:
-    """Return the measurements of a twin: equal rows, but with an IMU at rest."""
+    """Return the measurements of a duplicate: equal rows, but with an IMU at rest."""
     still = (0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
     return [row._replace(values=still) if row.kind is Kind.IMU else row for row in rows]

@@ -111,7 +111,7 @@ class ReadyPerception:
         self._nodes.take(self._pending.nodes)
         self._headings.take(self._pending.headings)
         self._pending.clear()
-        self._believe(now)
+        self._write_estimate(now)
         self._see()
         self._note()
         self._note_distances()
@@ -131,7 +131,7 @@ class ReadyPerception:
                 self._pairs.forget(np.flatnonzero((self._i == node) | (self._j == node)))
                 self._headings.forget(node)
 
-    def _believe(self, now: float) -> None:
+    def _write_estimate(self, now: float) -> None:
         """Write the estimate."""
         e, i, j, pairs = self.estimate, self._i, self._j, self._pairs
         still = self.constellation.is_static

@@ -62,7 +62,7 @@ class OtherTracker:
         t_ns = clock.map(reading.source.ticks, arrival_ns)
         if len(set(nodes)) < len(names):
             return ()
-        if reading.pos is not None and not self._believes(reading, nodes, t_ns, arrival_ns):
+        if reading.pos is not None and not self._is_plausible(reading, nodes, t_ns, arrival_ns):
             return ()
         t = (t_ns - self._start_ns) * NS
         if isinstance(reading, PoseReading):
@@ -71,7 +71,7 @@ class OtherTracker:
         self.pending.add_pair(t, nodes, reading)
         return () if reading.status in (Status.LOST, Status.ABSENT) else nodes
 
-    def _believes(
+    def _is_plausible(
         self, reading: PairReading | PoseReading, nodes: tuple[int, ...], t_ns: int, arrival_ns: int
     ) -> bool:
         """Return whether a position is plausible and its tracker is not frozen."""

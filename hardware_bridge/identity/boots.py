@@ -35,7 +35,7 @@ class RisingBoots:
         self._window = SequenceWindow(0 if mark is None else mark[1], endless=False, before=False)
 
     def check(self, boot: int | None, sequence: int | None) -> Verdict:
-        """Classify a message and store its number; never TWIN."""
+        """Classify a message and store its number; never DUPLICATE_ID."""
         if boot is None or sequence is None:
             return Verdict.REPLAY
         if self.mark is None or boot > self.mark[0]:
@@ -75,8 +75,8 @@ class _Boot:
 class ClaimedBoots:
     """Boot numbers without authentication: a new one is a restart if the old one is silent."""
 
-    twins: str = ""
-    """Reason why the last message was classified as TWIN."""
+    duplicate_reason: str = ""
+    """Reason why the last message was classified as DUPLICATE_ID."""
 
     def __init__(self, params: IdentityParams) -> None:
         self._params = params
@@ -101,8 +101,8 @@ class ClaimedBoots:
             state.stragglers += 1
             late = t_ns - state.over_ns > self._params.straggle * NS
             if late or state.stragglers > self._params.stragglers:
-                self.twins = self._where(link)
-                return Verdict.TWIN
+                self.duplicate_reason = self._where(link)
+                return Verdict.DUPLICATE_ID
         return Verdict.STALE
 
     def _begin(self, link: str, boot: int, sequence: int | None, t_ns: int) -> Verdict:
@@ -114,11 +114,11 @@ class ClaimedBoots:
             while self._restarts[0] < t_ns - self._params.restart * NS:
                 self._restarts.popleft()
             if len(self._restarts) > self._params.restarts:
-                self.twins = (
+                self.duplicate_reason = (
                     f"started {len(self._restarts)} times within {self._params.restart:g} s, "
                     f"last on link {link}"
                 )
-                return Verdict.TWIN
+                return Verdict.DUPLICATE_ID
         if len(self._boots) >= MOST_BOOTS:
             del self._boots[next(iter(self._boots))]
         window = None if sequence is None else SequenceWindow(sequence, endless=True)

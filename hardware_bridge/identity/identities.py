@@ -80,7 +80,7 @@ class Identities:
             boots, unbooted = ClaimedBoots(self._params), Unbooted(self._params)
             state = self._nodes[node] = _Node(boots, unbooted)
         if state.quarantined:
-            return Verdict.TWIN
+            return Verdict.DUPLICATE_ID
         judge: ClaimedBoots | Unbooted
         if source.boot is None:
             judge = state.unbooted
@@ -89,9 +89,10 @@ class Identities:
             judge = state.boots
             verdict = judge.check(link, source.boot, source.sequence, t_ns)
         state.refused = 0 if verdict.accepted else state.refused + 1
-        if verdict is Verdict.TWIN:
+        if verdict is Verdict.DUPLICATE_ID:
             state.quarantined = True
-            self._note(t_ns, node, "twin", f"{judge.twins}: refused until it is released")
+            text = f"{judge.duplicate_reason}: refused until it is released"
+            self._note(t_ns, node, "duplicate_id", text)
         elif verdict is Verdict.REBOOT:
             self._note(t_ns, node, "reboot", f"started again, on link {link}")
         elif state.refused == MANY_OLD:

@@ -45,8 +45,8 @@ class Unbooted:
     distinguished here.
     """
 
-    twins: str = ""
-    """Reason why the last message was classified as TWIN."""
+    duplicate_reason: str = ""
+    """Reason why the last message was classified as DUPLICATE_ID."""
 
     def __init__(self, params: IdentityParams) -> None:
         self._params = params
@@ -56,7 +56,7 @@ class Unbooted:
     def check(self, link: str, device: str | None, sequence: int | None, t_ns: int) -> Verdict:
         """Classify a message and store its number."""
         if device is not None and self._is_elsewhere(link, device, t_ns):
-            return Verdict.TWIN
+            return Verdict.DUPLICATE_ID
         if sequence is None:
             return Verdict.UNNUMBERED
         numbers = self._numbers.get((device, link))
@@ -86,7 +86,7 @@ class Unbooted:
             soon = t_ns - last.t_ns < self._params.change * NS
             last.changes = last.changes + 1 if soon else 0
             if last.changes >= self._params.changes:
-                self.twins = two_devices(last.link, link)
+                self.duplicate_reason = two_devices(last.link, link)
                 return True
             last.link = link
         elif t_ns - last.t_ns >= self._params.change * NS:

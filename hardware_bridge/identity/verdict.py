@@ -27,7 +27,7 @@ class Verdict(Enum):
     """Accepted already, or too old to decide."""
     STALE = "stale"
     """New, but of a previous boot: the clock of its stamp no longer exists."""
-    TWIN = "twin"
+    DUPLICATE_ID = "duplicate_id"
     """Two devices use the id of this node."""
     REPLAY = "replay"
     """Recorded and sent again, or indistinguishable from a replay."""

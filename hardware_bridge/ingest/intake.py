@@ -157,7 +157,7 @@ class Intake:
     def _take(self, stream: Stream, reading: Reading, arrival_ns: int) -> None:
         source = reading.source
         if stream.is_car and not isinstance(reading, OF_A_CAR):
-            self.refused["stranger"] += 1
+            self.refused["unknown_device"] += 1
             return
         if isinstance(reading, OperatorReading):
             self.trims.take(stream, reading, arrival_ns)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from hardware_bridge.ingest.stream import Stream
 from tracking.constellation import Constellation
 
-MOST_STRANGERS = 32
+MAX_UNKNOWN_DEVICES = 32
 """[-] Largest number of devices outside of the configuration that are reported."""
 
 
@@ -46,7 +46,7 @@ class Naming:
             notices: List of notices; each unknown device is reported here.
         """
         self._group, self._refused, self._notices = group, refused, notices
-        self._strangers: set[tuple[str, str]] = set()
+        self._unknown_devices: set[tuple[str, str]] = set()
 
     def index(
         self,
@@ -75,11 +75,11 @@ class Naming:
         return index
 
     def _tell(self, stream: Stream, device: str, t_ns: int) -> None:
-        self._refused["stranger"] += 1
+        self._refused["unknown_device"] += 1
         who = (stream.name, device)
-        if who in self._strangers or len(self._strangers) >= MOST_STRANGERS:
+        if who in self._unknown_devices or len(self._unknown_devices) >= MAX_UNKNOWN_DEVICES:
             return
-        self._strangers.add(who)
+        self._unknown_devices.add(who)
         text = f"{stream.name}: device {device} is no node of the configuration; name it in its ids"
         if stream.is_car:
             text = f"{stream.name}: device {device} sends on its line, and is not that car"

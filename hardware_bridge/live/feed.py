@@ -151,7 +151,9 @@ class LiveFeed:
                     self.note(self._now_ns(), text)
         if self._supervisor.gone:
             # The controllers stop the cars by themselves; there is no process to command them.
-            raise BridgeError("supervisor: it is gone, so the cars stand; start the drive again")
+            raise BridgeError(
+                "supervisor: it is gone, so the cars have stopped; start the drive again"
+            )
 
     def _note_links(self) -> None:
         for notice in self._links.drain_notices():

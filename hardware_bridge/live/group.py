@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from hardware_bridge.errors import BridgeError
-from hardware_bridge.live.believed import Believed
+from hardware_bridge.live.estimated_state import EstimatedState
 from hardware_bridge.live.picture import draw_picture
 from hardware_bridge.live.swarm import LiveSwarm
 from hardware_bridge.safety.gate import reason_text
@@ -72,7 +72,7 @@ class LiveGroup:
         n = config.n_slots
         self.task = make_task(config.task.name, n, 1, config.task.room, **config.task.options)
         self._weights = reward_weights(config.task.name, self.task)
-        self.believed = Believed(n)
+        self.estimated = EstimatedState(n)
         self._figures = make_figures(1, n, len(self.task.terms))
         self._command: F64 = np.zeros((1, n, 2))
         swarm.share(self.task.target, self.task.has_target, self._command)
@@ -128,7 +128,7 @@ class LiveGroup:
     def infos(self) -> Columns:
         """Return the infos of every car; errors and rewards are based on the estimates."""
         swarm = self.swarm
-        unknown = np.full((1, self.believed.present.shape[1]), np.nan)
+        unknown = np.full((1, self.estimated.present.shape[1]), np.nan)
         write_figures(
             self.task.error, unknown, swarm.view.ok, swarm.view.present, self._no_cars,
             self.task.rewards, self._weights, self.task.done, self._figures,
@@ -159,23 +159,23 @@ class LiveGroup:
             return
         seconds = DECISION if first else (t_ns - self.t_ns) * 1e-9
         self.t_ns = t_ns
-        swarm, task, believed = self.swarm, self.task, self.believed
+        swarm, task, estimated = self.swarm, self.task, self.estimated
         swarm.step(t_ns)
-        believed.update(swarm.view, seconds)
+        estimated.update(swarm.view, seconds)
         here = slice(0, 1)
         if (swarm.armed & ~self._armed).any():
             # The plan advanced while the car was stopped: it is not near its assigned slot.
             self.placed = False
         self._armed = swarm.armed.copy()
-        if first or (not self.placed and believed.complete):
+        if first or (not self.placed and estimated.complete):
             # Slots are assigned from the known positions, and once again when all are known.
-            self.placed = believed.complete
-            task.reset(believed, here)
+            self.placed = estimated.complete
+            task.reset(estimated, here)
             self._begun = self.cycles
         now = np.array([(self.cycles - self._begun) * DECISION])
-        task.update(believed, now, self._no_cars, here)
+        task.update(estimated, now, self._no_cars, here)
         self._ask()
-        self.rewards[0] = np.where(believed.present[0], task.rewards[0] @ self._weights, 0.0)
+        self.rewards[0] = np.where(estimated.present[0], task.rewards[0] @ self._weights, 0.0)
         self.terminated[:] = task.done
         self.truncated[:] = self.cycles >= self._max_cycles
         self._observe()

@@ -166,7 +166,7 @@ class Start:
         p, n = self._params, group.swarm.config.n_slots
         known, k, home = 0.0, 0, np.zeros(n, dtype=bool)
         while not home.all():
-            known = known + DECISION if group.believed.complete else 0.0
+            known = known + DECISION if group.estimated.complete else 0.0
             t = k * DECISION
             if home.any() or known >= p.sure or t >= p.find:
                 home |= is_home(p, n, t)
@@ -200,7 +200,7 @@ def check_pace(config: SwarmConfig, params: StartParams | None = None) -> None:
         driver = make_driver(car.driver, car.node, car.options, car.key, 0, lambda: 0)
         if driver.slowest > asked:
             raise BridgeError(
-                f"cars.{car.node}.options: slower than {driver.slowest:.2g} m/s it stands, and at "
+                f"cars.{car.node}.options: slower than {driver.slowest:.2g} m/s it stops, and at "
                 f"the start cars find each other at {asked:g} m/s; teach it to drive slower, or "
                 "raise slow of [safety] if that limits it"
             )

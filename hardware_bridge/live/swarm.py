@@ -158,11 +158,11 @@ class LiveSwarm:
             return ReadyPerception(
                 group, tracker.positions, pending, self._block, self._powered, n_rangefinders
             )
-        believed = FOR_POLICIES
+        filter_params = FOR_POLICIES
         if tracker.accuracy is not None:
-            joint = replace(believed.joint, accuracy=tracker.accuracy)
-            believed = replace(believed, joint=joint)
-        params = TrackerParams(filter=believed, horizon=HorizonParams(delay=tracker.delay))
+            joint = replace(filter_params.joint, accuracy=tracker.accuracy)
+            filter_params = replace(filter_params, joint=joint)
+        params = TrackerParams(filter=filter_params, horizon=HorizonParams(delay=tracker.delay))
         return Perception(
             group,
             params,

@@ -116,7 +116,7 @@ def unknown(m: Moment, p: SafetyParams) -> Verdict:
     known = ranged & (age <= p.range_limit)
     # An obstruction is temporary: a car that is stopped, not disarmed, continues once it is past.
     hold: Bool = np.any(unsure & ~ranged, axis=-1)
-    stand: Bool = np.any(unsure & ~known, axis=-1)
+    halt: Bool = np.any(unsure & ~known, axis=-1)
     # DOUBTFUL lasts for seconds and ends only through motion; capped to `slow`, a formation would
     # break up. Pairs that are not known yet are capped.
     slow: Bool = np.any(unsure & (q.status != Status.DOUBTFUL), axis=-1)
@@ -125,7 +125,7 @@ def unknown(m: Moment, p: SafetyParams) -> Verdict:
     speed = stopping_speed(way, p.reaction + np.where(known, np.maximum(age, 0.0), 0.0), p.braking)
     cap = np.where(unsure, speed, FREE).min(axis=-1)
     cap = np.where(slow, np.minimum(cap, p.slow), cap)
-    return _capped(np.where(stand, 0.0, cap), hold)
+    return _capped(np.where(halt, 0.0, cap), hold)
 
 
 def lost_heading(m: Moment, p: SafetyParams) -> Verdict:
@@ -241,7 +241,8 @@ RULES = (
     Rule(
         "deaf", deaf, "it does not execute commands",
         "stops for good without an answer, or a word of its speed, for `answer_time` (controllers "
-        "that give them), or when its wheels stand for `idle_time` although it is asked to drive",
+        "that give them), or when its wheels are at rest for `idle_time` although it is asked to "
+        "drive",
     ),
     Rule(
         "battery", battery, "its battery is nearly empty",
@@ -260,9 +261,9 @@ RULES = (
     Rule(
         "unknown", unknown, "the position of another car is not known",
         "`slow` (not where ranges contradict each other), and half of what the last range leaves; "
-        "stands while that is older than `range_limit`, and stops for good if there was none",
+        "stops while that is older than `range_limit`, and stops for good if there was none",
     ),
-    Rule("heading", lost_heading, "the heading is not known", "stands until it is"),
+    Rule("heading", lost_heading, "the heading is not known", "stops until it is"),
     Rule(
         "separation", separation, "another car is too near to go on",
         "only as fast, and turning towards it only as far, as leaves both their ways to a stop",

@@ -10,8 +10,8 @@ import numpy as np
 
 from hardware_bridge.drivers.base import CarDriver
 from hardware_bridge.readings import Reading
-from hardware_bridge.safety.believed import Believed
 from hardware_bridge.safety.gate import Gate, GateOutput, reason_text
+from hardware_bridge.safety.message_filter import MessageFilter
 from hardware_bridge.safety.messages import Decision, Message, Notice, Order, Report, Word
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import Picture, blank_picture
@@ -37,7 +37,7 @@ class Supervisor:
         *,
         cells: Mapping[int, int] = NONE_KNOWN,
         watchdog: Mapping[int, float] = NONE_KNOWN,
-        believed: Mapping[int, Believed] = NONE_KNOWN,
+        message_filters: Mapping[int, MessageFilter] = NONE_KNOWN,
     ) -> None:
         """Create a supervisor with no car armed.
 
@@ -48,7 +48,7 @@ class Supervisor:
             names: Name of each of these slots in notices.
             cells: Number of battery cells of each slot where it is known.
             watchdog: Watchdog time of each slot [s]; default: `SafetyParams.deadman`.
-            believed: Message filter of each slot; without one all messages are accepted.
+            message_filters: Message filter of each slot; without one all messages are accepted.
         """
         slots = range(n_cars)
         self._telemetry = Telemetry(
@@ -60,7 +60,8 @@ class Supervisor:
             slowest=[drivers[k].slowest if k in drivers else 0.0 for k in slots],
         )
         self._gate = Gate(params, 1, n_cars)
-        self._drivers, self._names, self._believed = dict(drivers), dict(names), dict(believed)
+        self._drivers, self._names = dict(drivers), dict(names)
+        self._message_filters = dict(message_filters)
         self._picture: Picture = blank_picture(1, n_cars)
         self._word = np.full(1, -np.inf)
         self._t_last_message: F64 = np.full((1, n_cars), -np.inf)
@@ -112,8 +113,8 @@ class Supervisor:
     def receive(self, slot: int, data: bytes, now: float) -> None:
         """Process bytes that a car's controller sent at time `now` [s]."""
         readings: Iterable[Reading] = self._drivers[slot].telemetry.feed(data)
-        if slot in self._believed:
-            readings = self._believed[slot].sift(readings, round(now * 1e9))
+        if slot in self._message_filters:
+            readings = self._message_filters[slot].sift(readings, round(now * 1e9))
         self._telemetry.take(slot, readings, now)
 
     def abandon(self, why: str) -> None:

@@ -16,7 +16,7 @@ OLD = 0.5
 """[s] Age from which a reported speed is ignored."""
 SAG = 2.0
 """[s] Time constant of the mean voltage, since a starting motor lets it sag for a moment."""
-STANDS, DRIVES = 0.05, 0.2
+REST_SPEED, DRIVES = 0.05, 0.2
 """[m/s] A car slower than the first speed is at rest; commands from the second on must move it."""
 MARGIN = 1.1
 """[-] Factor on a car's lowest speed; smaller commands need not move it."""
@@ -125,8 +125,8 @@ class Telemetry:
         forward, backward = recent.forward[0], recent.backward[0]
         beyond = np.maximum(self._speed - forward, -self._speed - backward) > p.runaway_speed
         self._over_since = _since(self._over_since, fresh & beyond, now)
-        stands = fresh & (np.abs(self._speed) < STANDS)
-        idle = moving & stands & (np.abs(recent.speed[0]) >= self._drives)
+        at_rest = fresh & (np.abs(self._speed) < REST_SPEED)
+        idle = moving & at_rest & (np.abs(recent.speed[0]) >= self._drives)
         self._idle_since = _since(self._idle_since, idle, now)
         # Answers are expected from the opening of the port on.
         self._answered = np.where(linked & np.isfinite(self._answered), self._answered, now)

@@ -14,8 +14,8 @@ from hardware_bridge.drivers import make_driver
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.links import Links
 from hardware_bridge.pauses import short_pauses
-from hardware_bridge.safety.believed import Believed
 from hardware_bridge.safety.charge import REPORT_EVERY, ROOM, TICK_NS, Charge
+from hardware_bridge.safety.message_filter import MessageFilter
 from hardware_bridge.safety.messages import (
     Decision,
     Message,
@@ -82,8 +82,8 @@ class _Watch:
             {slot: car.port.name for slot, car in charge.cars},
             cells={slot: car.cells for slot, car in charge.cars},
             watchdog={slot: car.watchdog for slot, car in charge.cars if car.watchdog},
-            believed={
-                slot: Believed(car, charge.marks.get(car.port.name, {}))
+            message_filters={
+                slot: MessageFilter(car, charge.marks.get(car.port.name, {}))
                 for slot, car in charge.cars
             },
         )

@@ -189,7 +189,7 @@ COMMAND = Message(
         _steering("left is positive"),
         Field(
             name="flags", type="u8", bits=("brake",),
-            meaning="brake: stand still, whatever the others say",
+            meaning="brake: stop, whatever the other fields say",
         ),
     ),
 )  # fmt: skip

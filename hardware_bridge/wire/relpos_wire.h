@@ -20,7 +20,7 @@
 #include <stdint.h>
 
 #define RELPOS_VERSION 1u
-#define RELPOS_HOST 65535u /* node of whoever commands the cars */
+#define RELPOS_HOST 65535u /* node of the host that commands the cars */
 #define RELPOS_MOST_ROWS 32u
 #define RELPOS_MOST_FRAME 512u
 #define RELPOS_MOST_CODED (RELPOS_MOST_FRAME + 3u) /* stuffed */
@@ -123,7 +123,7 @@ typedef struct {
     uint16_t to; /* node of the car that is meant */
     int16_t speed; /* [1/1000 m/s] forward */
     int16_t steering; /* [1/10000 rad] left is positive */
-    uint8_t flags; /* brake: stand still, whatever the others say */
+    uint8_t flags; /* brake: stop, whatever the other fields say */
 } relpos_command;
 
 /* a person with a remote control asks a car for a velocity */
@@ -760,7 +760,7 @@ static inline size_t relpos_encode(const relpos_frame *f, const uint8_t *key, ui
     return 1 + relpos_stuff(raw, n + RELPOS_CRC_BYTES, out + 1);
 }
 
-/* Decode what stood between two zeros, in place. With a key, frames without a right MAC are
+/* Decode the bytes between two zeros, in place. With a key, frames without a right MAC are
    damaged; without one (NULL) MACs are not checked. */
 static inline int relpos_decode(uint8_t *bytes, size_t n, const uint8_t *key, relpos_frame *f) {
     int known;

@@ -133,13 +133,13 @@ class FormationGymEnv(gymnasium.Env[F32, Any]):
             EnvError: An option is unknown or cannot be fulfilled.
         """
         super().reset(seed=seed)
-        wishes = reset_options(options, self._parts)
+        requested = reset_options(options, self._parts)
         if seed is not None or not self._seeded:
             # Episodes have a generator of their own, so that `np_random` is the user's.
             self._formation.seed(0, episode_rng(seed))
             self._seeded = True
         self._begun = False  # until all requests are fulfilled
-        self._formation.begin([0], options=wishes)
+        self._formation.begin([0], options=requested)
         self._begun, self._over = True, False
         self._film.forget()
         self._show()

@@ -152,9 +152,9 @@ class FormationEnv(BaseFormationParallelEnv):
         self._begun = False
 
     def _begin(self, options: Mapping[str, Any]) -> None:
-        wishes = reset_options(options, self._parts)
+        requested = reset_options(options, self._parts)
         self._recording = recording = Recording() if self._record else None
-        self._formation.begin([0], None if recording is None else recording.add_swarm, wishes)
+        self._formation.begin([0], None if recording is None else recording.add_swarm, requested)
         self._film.forget()
 
     def _show(self) -> None:

@@ -12,7 +12,7 @@ class SharedAttributeVecEnv(VecEnv):  # type: ignore[misc]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Return an attribute of this environment, once per requested agent slot."""
-        return [getattr(self, attr_name)] * len(self._seats_of(indices))
+        return [getattr(self, attr_name)] * len(self._slots_of(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Set an attribute that all agent slots share."""
@@ -23,11 +23,11 @@ class SharedAttributeVecEnv(VecEnv):  # type: ignore[misc]
     ) -> list[Any]:
         """Call a method once and return its result once per requested agent slot."""
         result = getattr(self, method_name)(*method_args, **method_kwargs)
-        return [result] * len(self._seats_of(indices))
+        return [result] * len(self._slots_of(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """Return False for every requested agent slot."""
-        return [False] * len(self._seats_of(indices))
+        return [False] * len(self._slots_of(indices))
 
-    def _seats_of(self, indices: Any) -> list[int]:
+    def _slots_of(self, indices: Any) -> list[int]:
         return list(self._get_indices(indices))

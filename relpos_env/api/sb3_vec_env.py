@@ -125,12 +125,12 @@ class FormationVecEnv(SharedAttributeVecEnv):
             if seed is not None or not self._begun:
                 self.formation.seed(env, episode_rng(seed))
         self._begun = False  # until all requests are fulfilled
-        wishes = [reset_options(self._options[k * self.n_cars], self._parts) for k in rooms]
+        requested = [reset_options(self._options[k * self.n_cars], self._parts) for k in rooms]
         if not any(self._options):
             self.formation.begin(rooms)
         else:
-            for env, wish in zip(rooms, wishes, strict=True):
-                self.formation.begin([env], options=wish)
+            for env, request in zip(rooms, requested, strict=True):
+                self.formation.begin([env], options=request)
         self._reset_options()
         self._next_seeds = [None] * self.formation.n_envs
         self._begun = True
@@ -164,8 +164,8 @@ class FormationVecEnv(SharedAttributeVecEnv):
         dones = (over[:, None] | f.left).ravel()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if not f.active.all():
-            for seat in np.nonzero(~f.active.ravel())[0]:
-                infos[seat] = {"active": False}
+            for slot in np.nonzero(~f.active.ravel())[0]:
+                infos[slot] = {"active": False}
         if dones.any():
             last, columns = self._rows(f.observations), f.infos()
             for done in np.nonzero(dones)[0].tolist():

@@ -123,14 +123,14 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
             raise EnvError(f"reset_mask: expected {self.num_envs} flags, some True, got {mask}")
         if not (self._begun | mask).all():
             raise EnvError("reset_mask: expected True everywhere at the first reset")
-        wishes = reset_options(options, self._parts)
+        requested = reset_options(options, self._parts)
         if seeds[0] is not None:
             self._np_random, self._np_random_seed = episode_rng(seeds[0]), seeds[0]
         for env in np.flatnonzero(mask).tolist():
             if seeds[env] is not None or not self._seeded[env]:
                 self.formation.seed(env, episode_rng(seeds[env]))
                 self._seeded[env] = True
-        self._begin(mask, wishes)
+        self._begin(mask, requested)
         return self._observations(), self._infos(None if mask.all() else mask)
 
     def step(self, actions: Any) -> tuple[F32, F64, Bool, Bool, dict[str, Any]]:
@@ -182,11 +182,11 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
         for film in self._films:
             film.close()
 
-    def _begin(self, envs: Bool, wishes: ResetOptions = NO_OPTIONS) -> None:
+    def _begin(self, envs: Bool, requested: ResetOptions = NO_OPTIONS) -> None:
         """Start an episode in some environments, (env)."""
         which = np.flatnonzero(envs).tolist()
         self._begun[envs] = False  # until all requests are fulfilled
-        self.formation.begin(which, options=wishes)
+        self.formation.begin(which, options=requested)
         self._begun[envs], self._over[envs] = True, False
         if self.render_mode is not None:
             for env in which:

@@ -83,12 +83,12 @@ def judge(
 
 
 @kernel
-def tracking_errors(body, believed, ok, out):
+def tracking_errors(body, estimated, ok, out):
     """Write the mean distance of estimated from true relative positions of usable estimates.
 
     Args:
         body: True states, x and y first, (env, car, 6) [m].
-        believed: Estimated relative positions, (env, car, other, 2) [m].
+        estimated: Estimated relative positions, (env, car, other, 2) [m].
         ok: Mask of usable estimates, (env, car, other).
         out: Mean distances, (env, car) [m], written; NaN without usable estimates.
     """
@@ -97,8 +97,8 @@ def tracking_errors(body, believed, ok, out):
             total, n = 0.0, 0
             for b in range(out.shape[1]):
                 if ok[e, a, b]:
-                    x = believed[e, a, b, 0] - (body[e, b, 0] - body[e, a, 0])
-                    y = believed[e, a, b, 1] - (body[e, b, 1] - body[e, a, 1])
+                    x = estimated[e, a, b, 0] - (body[e, b, 0] - body[e, a, 0])
+                    y = estimated[e, a, b, 1] - (body[e, b, 1] - body[e, a, 1])
                     total += math.sqrt(x * x + y * y)
                     n += 1
             out[e, a] = total / n if n > 0 else math.nan

@@ -43,7 +43,7 @@ def put_own(view, out, e, a, k, c, s):
 
 
 @small_kernel
-def put_wishes(view, out, e, a, k, c, s):
+def put_targets(view, out, e, a, k, c, s):
     """Write the targets of the other cars: mask and positions (3 numbers each)."""
     n = view.ok.shape[1]
     for b in range(n):
@@ -92,7 +92,7 @@ def observe_relative(view, with_cov, out):
             if with_cov:
                 put_certainty(view, out, e, a, k, c, s)
                 k += (3 + 2 + N_STATUS) * others
-            put_wishes(view, out, e, a, k, c, s)
+            put_targets(view, out, e, a, k, c, s)
             put_own(view, out, e, a, k + 3 * others, c, s)
 
 
@@ -148,5 +148,5 @@ def observe_ranges(view, out):
                 put(out, e, a, others + o, view.distance[e, a, b] if fresh else 0.0, FAR)
                 put(out, e, a, 2 * others + o, age if fresh else 0.0, OLD)
                 put(out, e, a, 3 * others + o, view.gap[e, a, b] if fresh else 0.0, LOUD)
-            put_wishes(view, out, e, a, 4 * others, c, s)
+            put_targets(view, out, e, a, 4 * others, c, s)
             put_own(view, out, e, a, 7 * others, c, s)

@@ -38,7 +38,7 @@ class Pose:
     """Tilt of the pelvis, forwards, (time) [rad]."""
     twist: F64
     """Yaw of the trunk relative to the pelvis, to the left, (time) [rad]."""
-    lean: F64
+    trunk_tilt: F64
     """Tilt of the trunk relative to the pelvis, forwards, (time) [rad]."""
     ball_w: F64
     """Balls of the feet, (time, side, 3) [m]; on the floor if z is 0."""
@@ -57,7 +57,7 @@ class Pose:
 
     @classmethod
     def standing(cls, size: SkeletonSize, pos: F64, heading: F64) -> Pose:
-        """Return the pose of a person who stands upright.
+        """Return the pose of an upright person at rest.
 
         Args:
             size: Size of the person.
@@ -72,7 +72,7 @@ class Pose:
             pelvis_turn=still,
             pelvis_tilt=still,
             twist=still,
-            lean=still,
+            trunk_tilt=still,
             ball_w=ball_at(size, pos, heading),
             foot_yaw=heading[:, None] + SIDES * TOE_OUT,
             heel_lift=sides,

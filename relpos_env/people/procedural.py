@@ -27,13 +27,13 @@ def procedural_pose(
     dt: float,
     rng: np.random.Generator,
 ) -> tuple[SkeletonSize, Pose, F64]:
-    """Return the pose of a person who stands first and then repeats the exercises.
+    """Return the pose of a person who is at rest first and then repeats the exercises.
 
     Args:
         exercises: Names in `EXERCISES`, in order.
         room: Size along x and along y [m]; the person stays inside.
         seconds: Length of the run [s].
-        still: Duration of the initial stand [s].
+        still: Duration of the initial rest [s].
         dt: Time step [s].
         rng: Generator of the person and of the variations between bouts.
 

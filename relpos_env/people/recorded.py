@@ -38,7 +38,7 @@ def recorded_body(
     Args:
         clips: Clips to play, all of one rate.
         seconds: Length of the run [s].
-        still: Duration of the initial stand [s].
+        still: Duration of the initial rest [s].
         dt: Time step of the samples [s].
         rng: Generator of the order of the clips and of the first heading.
     """

@@ -132,7 +132,7 @@ class BodySimulation:
 
 
 def _samples(scenario: HumanScenario, seconds: float, rng: np.random.Generator) -> BodySamples:
-    """Return the body of a scenario, which stands first while the trackers are switched on."""
+    """Return the body of a scenario, which is at rest first while the trackers are switched on."""
     if scenario.motion == "recorded":
         return recorded_body(load_clips(), seconds, STAND_STILL, DT, rng)
     return procedural_body(scenario.exercises, scenario.room, seconds, STAND_STILL, DT, rng)

@@ -1,6 +1,6 @@
 """Forward kinematics: positions of limbs and trackers from the pose of a person.
 
-Frames of all segments are x forward, y left, z up when the person stands with hanging arms.
+Frames of all segments are x forward, y left, z up of an upright person with hanging arms.
 The legs are solved from hip and ankle in the plane of the foot's direction; every other joint
 rotates by the angles of the pose. Trackers are on the skin, outside their own limb.
 """
@@ -40,7 +40,7 @@ def body_samples(size: SkeletonSize, pose: Pose, t: F64) -> BodySamples:
     pelvis = Rotation.from_euler(
         "ZY", np.column_stack([pose.heading + pose.pelvis_turn, pose.pelvis_tilt])
     )
-    trunk = pelvis * Rotation.from_euler("ZY", np.column_stack([pose.twist, pose.lean]))
+    trunk = pelvis * Rotation.from_euler("ZY", np.column_stack([pose.twist, pose.trunk_tilt]))
     neck = pose.pelvis_w + trunk.apply([0.0, 0.0, size.trunk])
     hip, knee, ankle_w, leg = _legs(size, pose, pelvis)
     shoulder, elbow, wrist, upper, fore = _arms(size, pose, trunk, neck)

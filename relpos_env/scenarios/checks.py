@@ -151,12 +151,12 @@ def _check_gap(gap: Gap, s: _Checked) -> None:
     boxes = boxes_of(s.obstacles)
     for k in (1.0, -1.0):
         # A thin slice of the wall just next to the opening.
-        beside = _slice(gap, k * (0.5 * gap.width + 0.005), 0.002)
-        if not overlap(beside, boxes).any():
+        edge = _slice(gap, k * (0.5 * gap.width + 0.005), 0.002)
+        if not overlap(edge, boxes).any():
             raise EnvError("gap: expected walls at both its sides, see Scenario.with_gap")
     blocked = overlap(_slice(gap, 0.0, gap.width - 0.002), boxes)[0]
     if blocked.any():
-        raise EnvError(f"gap: obstacles[{int(blocked.argmax())}] stands in it")
+        raise EnvError(f"gap: obstacles[{int(blocked.argmax())}] blocks it")
 
 
 def _slice(gap: Gap, aside: float, width: float) -> F64:

@@ -86,7 +86,7 @@ class Task(ABC):
         """Reward terms, unweighted, (env, car, term) [-]."""
         self.done: Bool = np.zeros(n_envs, dtype=bool)
         """True where the task is done, (env)."""
-        self._seated: Bool = np.zeros((n_envs, n_cars), dtype=bool)
+        self._assigned: Bool = np.zeros((n_envs, n_cars), dtype=bool)
         self._boxes: list[F64] = [NO_BOXES] * n_envs
         """Boxes in each room at the start of the episode."""
 
@@ -103,7 +103,7 @@ class Task(ABC):
         for env in range(start, stop):
             self._boxes[env] = NO_BOXES if boxes is None else boxes[env].copy()
             present = state.present[env]
-            self._seat(env, present)
+            self._assign(env, present)
             if present.any():
                 self.begin(env, state.pos_w[env], np.flatnonzero(present))
             else:
@@ -123,9 +123,9 @@ class Task(ABC):
             return
         for env in range(start, stop):
             present = state.present[env]
-            if not np.array_equal(present, self._seated[env]):
-                before = self._seated[env].copy()
-                self._seat(env, present)
+            if not np.array_equal(present, self._assigned[env]):
+                before = self._assigned[env].copy()
+                self._assign(env, present)
                 if present.any():
                     cars = np.flatnonzero(present)
                     self.change(env, state.pos_w[env], cars, before, float(t[env]))
@@ -170,9 +170,9 @@ class Task(ABC):
     def compute(self, state: Truth, t: F64, collided: F64, start: int, stop: int) -> int:
         """Write the arrays of environments with valid assignments; return the number of others."""
 
-    def _seat(self, env: int, present: Bool) -> None:
+    def _assign(self, env: int, present: Bool) -> None:
         """Record the present cars; tasks without targets overwrite `has_target` with False."""
-        self._seated[env] = present
+        self._assigned[env] = present
         both = present[:, None] & present[None, :]
         np.fill_diagonal(both, False)
         self.has_target[env] = both

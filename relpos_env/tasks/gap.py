@@ -138,7 +138,7 @@ class Gap(Task):
             state.present,
             t,
             collided,
-            self._seated,
+            self._assigned,
             self._route,
             self._lag,
             self._limits,
@@ -172,15 +172,15 @@ class Gap(Task):
         n = self._route.shape[2]
         for car, place in zip(cars, places, strict=True):
             route = np.concatenate([pos[car][None], way, np.tile(place, (n - 1 - len(way), 1))])
-            legs = np.linalg.norm(np.diff(route, axis=0), axis=1)
+            segments = np.linalg.norm(np.diff(route, axis=0), axis=1)
             self._route[env, car, :, :2] = route
-            self._route[env, car, 1:, 2] = np.cumsum(legs)
+            self._route[env, car, 1:, 2] = np.cumsum(segments)
 
     def _end_at(self, env: int, car: int, place: F64) -> None:
         """Replace the end of a car's route."""
         route = self._route[env, car]
         # The route of a car that joined behind the wall is one segment, its end repeated.
         last = np.flatnonzero(route[1:, 2] > route[:-1, 2])
-        leg = int(last[-1]) if len(last) else 0
-        route[leg + 1 :, :2] = place
-        route[leg + 1 :, 2] = route[leg, 2] + np.linalg.norm(place - route[leg, :2])
+        segment = int(last[-1]) if len(last) else 0
+        route[segment + 1 :, :2] = place
+        route[segment + 1 :, 2] = route[segment, 2] + np.linalg.norm(place - route[segment, :2])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from relpos_env.tasks.geometry.curves import Curve
 from relpos_env.tasks.geometry.shapes import Formation
-from relpos_env.tasks.moving import MARGIN, Motion, MovingFormation, Stand
+from relpos_env.tasks.moving import MARGIN, AnchorPlacement, Motion, MovingFormation
 from relpos_env.tasks.options import finite, half_room
 from tracking.arrays import F64
 
@@ -39,6 +39,8 @@ def hold(
     formation = Formation(shape, n_cars, spacing)
     half = half_room(room, MARGIN)
     free = half - formation.fit(half, heading)
-    stand = Stand(half=(float(free[0]), float(free[1])), room=(0.5 * room[0], 0.5 * room[1]))
-    motion = Motion(curve=Curve.point(), heading=heading, stand=stand)
+    placement = AnchorPlacement(
+        half=(float(free[0]), float(free[1])), room=(0.5 * room[0], 0.5 * room[1])
+    )
+    motion = Motion(curve=Curve.point(), heading=heading, placement=placement)
     return MovingFormation(n_cars, n_envs, formation, motion)

@@ -28,7 +28,7 @@ MARGIN = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stand:
+class AnchorPlacement:
     """Placement of a stationary frame: at the group's mean position, or near it if obstructed."""
 
     half: tuple[float, float]
@@ -55,12 +55,12 @@ class Motion:
     """[rad] Initial heading of a frame that does not turn with the curve."""
     lookahead: float = 0.0
     """[s] Lead time of the reference velocity, which compensates the lag of the cars."""
-    stand: Stand | None = None
+    placement: AnchorPlacement | None = None
     """Placement of a stationary frame; None for a frame on a curve."""
 
     def __post_init__(self) -> None:
-        if self.stand is not None and self.curve.length > 0.0:
-            raise ValueError("stand: expected none of a frame that follows a curve")
+        if self.placement is not None and self.curve.length > 0.0:
+            raise ValueError("placement: expected none of a frame that follows a curve")
 
 
 class MovingFormation(Task):
@@ -86,11 +86,11 @@ class MovingFormation(Task):
             led: True if the first present car has the first slot.
             all_informed: True if all cars receive the reference velocity; else only the first.
         """
-        self._stand, self._ways = motion.stand, None
+        self._placement, self._ways = motion.placement, None
         terms: tuple[str, ...]
-        if self._stand is not None:
+        if self._placement is not None:
             terms = ("formation", "place", *COMMON_TERMS, "progress")
-            self._ways = Ways(n_cars, n_envs, self._stand.room)
+            self._ways = Ways(n_cars, n_envs, self._placement.room)
         else:
             ends = motion.curve.length > 0.0 and not motion.curve.closed
             terms = ("formation", "velocity", *COMMON_TERMS, *(["time"] if ends else []))
@@ -106,7 +106,7 @@ class MovingFormation(Task):
             float(curve.closed),
             float(motion.turning),
         )
-        place_scale = 0.0 if self._stand is None else PLACE_SCALE
+        place_scale = 0.0 if self._placement is None else PLACE_SCALE
         self._limits = (float(motion.lookahead), TOLERANCE, ERROR_SCALE, place_scale)
         self._now = np.zeros(7)
 
@@ -117,8 +117,8 @@ class MovingFormation(Task):
         anchor, arc = np.zeros(2), 0.0
         if self._ways is not None:
             self._ways.lay(env, self._boxes[env])
-        if self._stand is not None:
-            anchor = self._free_anchor(self._stand, env, middle, len(cars))
+        if self._placement is not None:
+            anchor = self._free_anchor(self._placement, env, middle, len(cars))
         elif motion.curve.length > 0.0 and motion.curve.closed:
             arc = float(motion.curve.nearest(pos[cars[0]] if self._led else middle))
         heading = 0.0 if motion.turning else motion.heading
@@ -127,11 +127,11 @@ class MovingFormation(Task):
 
     def set_goals(self, env: int, goals: F64, cars: I64) -> None:
         """Use the goals as slots of the present cars until cars join or leave."""
-        if self._stand is None:
+        if self._placement is None:
             raise EnvError("goals: expected none, the task has a way of its own")
         if len(goals) != len(cars):
             raise EnvError(f"goals: expected one for each of {len(cars)} cars, got {len(goals)}")
-        if np.any(np.abs(goals) > self._stand.room):
+        if np.any(np.abs(goals) > self._placement.room):
             raise EnvError(f"goals: expected points in the room, got {goals.tolist()}")
         anchor = goals.mean(axis=0)
         c, s = np.cos(self._motion.heading), np.sin(self._motion.heading)
@@ -143,9 +143,9 @@ class MovingFormation(Task):
 
         A stationary frame moves if slots for this number of cars would be in an obstacle.
         """
-        if self._stand is not None:
+        if self._placement is not None:
             requested = self._frame[env, :2]
-            self._frame[env, :2] = self._free_anchor(self._stand, env, requested, len(cars))
+            self._frame[env, :2] = self._free_anchor(self._placement, env, requested, len(cars))
         self._give(env, pos, cars, t)
 
     def update(self, state: Truth, t: F64, collided: F64, envs: slice) -> None:
@@ -172,7 +172,7 @@ class MovingFormation(Task):
             state.present,
             t,
             collided,
-            self._seated,
+            self._assigned,
             self._frame,
             self._places,
             self._motion.curve.pieces,
@@ -187,11 +187,11 @@ class MovingFormation(Task):
         )
         return n_changed
 
-    def _free_anchor(self, stand: Stand, env: int, requested: F64, n: int) -> F64:
+    def _free_anchor(self, placement: AnchorPlacement, env: int, requested: F64, n: int) -> F64:
         """Return the feasible anchor of a formation of n cars nearest to `requested`, (2) [m]."""
         c, s = np.cos(self._motion.heading), np.sin(self._motion.heading)
         places = self._formation.places(n) @ np.array([[c, s], [-s, c]])
-        return free_anchor(requested, np.array(stand.half), places, self._boxes[env])
+        return free_anchor(requested, np.array(placement.half), places, self._boxes[env])
 
     def _give(self, env: int, pos: F64, cars: I64, t: float) -> None:
         frame_now(env, t, self._frame, self._motion.curve.pieces, self._constants, self._now)

@@ -89,7 +89,7 @@ class Rendezvous(Task):
             state.present,
             t,
             collided,
-            self._seated,
+            self._assigned,
             self._place,
             self._since,
             self._limits,
@@ -100,6 +100,6 @@ class Rendezvous(Task):
         )
         return n_changed
 
-    def _seat(self, env: int, present: Bool) -> None:
-        super()._seat(env, present)
+    def _assign(self, env: int, present: Bool) -> None:
+        super()._assign(env, present)
         self.has_target[env] = False

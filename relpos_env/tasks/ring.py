@@ -81,7 +81,7 @@ class Ring(Task):
         n_changed: int = update_ring(
             start, stop, state.pos_w, state.vel_w, state.accel_w, state.clearance,
             state.present, t, collided,
-            self._seated, self._arc, self._curve.pieces, self._motion, self.target, self.plan,
+            self._assigned, self._arc, self._curve.pieces, self._motion, self.target, self.plan,
             self.goal_w, self.error, self.rewards,
         )  # fmt: skip
         return n_changed

@@ -75,8 +75,8 @@ def drive_car(p, body, drive, e, n, speed, steering, dt, wrench):
         wrench[e, n, 2] = -rate * p.inertia / dt
 
     # The body rolls outwards in a turn (to the right in a left turn) and dives when braking.
-    lean, dive = p.roll_per_force * f_y, -p.pitch_per_force * f_x
-    _sway(drive, e, n, ROLL, lean, p.roll_stiffness, p.roll_damping, p.roll_slack, dt)
+    roll, dive = p.roll_per_force * f_y, -p.pitch_per_force * f_x
+    _sway(drive, e, n, ROLL, roll, p.roll_stiffness, p.roll_damping, p.roll_slack, dt)
     _sway(drive, e, n, PITCH, dive, p.pitch_stiffness, p.pitch_damping, p.pitch_slack, dt)
 
 

@@ -91,11 +91,11 @@ def take_bodies(bodies, solver, e):
     for row in range(rows.shape[1]):
         owner = solver.owner[e, row]
         if owner >= n_cars:
-            b, body, stands = owner - n_cars, bodies.box_body, True
+            b, body, at_rest = owner - n_cars, bodies.box_body, True
             for k in range(6):
                 body[e, b, k] = rows[e, row, k]
-                stands = stands and (k < 3 or abs(rows[e, row, k]) < REST)
-            if stands:
+                at_rest = at_rest and (k < 3 or abs(rows[e, row, k]) < REST)
+            if at_rest:
                 body[e, b, 3] = body[e, b, 4] = body[e, b, 5] = 0.0
             bodies.boxes[e, b, 0], bodies.boxes[e, b, 1] = body[e, b, 0], body[e, b, 1]
             bodies.boxes[e, b, 4] = math.cos(body[e, b, 2])

@@ -176,10 +176,10 @@ class PhysicsSpace:
         # Floor friction: joints with a limited force and without position correction. Forces
         # against the speed of the last step would let every pushed box creep.
         grip, floor = BOX_FRICTION * mass * GRAVITY, self.space.static_body
-        stand = pymunk.PivotJoint(floor, body, (0.0, 0.0), (0.0, 0.0))
+        pivot = pymunk.PivotJoint(floor, body, (0.0, 0.0), (0.0, 0.0))
         turn = pymunk.GearJoint(floor, body, 0.0, 1.0)
-        stand.max_force, turn.max_force = grip, grip * 0.25 * (box.width + box.height)
-        for joint in (stand, turn):
+        pivot.max_force, turn.max_force = grip, grip * 0.25 * (box.width + box.height)
+        for joint in (pivot, turn):
             joint.max_bias = 0.0
             self.space.add(joint)
         return body

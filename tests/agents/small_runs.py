@@ -7,8 +7,8 @@ from agents.training.config import TrainConfig
 from agents.training.run_folder import LAST, RunFolder
 
 SMALL = {
-    "frames": "1400", "leg": "2", "envs": "3", "steps": "16", "batch": "64", "epochs": "2",
-    "eval_episodes": "2", "choice_episodes": "2", "seconds": "12", "width": "8",
+    "frames": "1400", "eval_interval": "2", "envs": "3", "steps": "16", "batch": "64",
+    "epochs": "2", "eval_episodes": "2", "choice_episodes": "2", "seconds": "12", "width": "8",
     "threads": "1", "cars": "6",
 }  # fmt: skip
 

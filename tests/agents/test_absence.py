@@ -8,7 +8,7 @@ from stable_baselines3.common.buffers import RolloutBuffer
 
 from agents.training.ppo.buffer import SwarmRolloutBuffer
 
-STEPS, SEATS = 12, 3
+STEPS, SLOTS = 12, 3
 SPACE = Box(-np.inf, np.inf, (2,), np.float32)
 
 
@@ -22,21 +22,21 @@ def filled(kind, zeros_worth, *, away=(), left=None):
         left: Step in which it leaves.
     """
     rng = np.random.default_rng(3)
-    buffer = kind(STEPS, SPACE, SPACE, device="cpu", gae_lambda=0.95, gamma=0.99, n_envs=SEATS)
-    starts = np.zeros(SEATS)
+    buffer = kind(STEPS, SPACE, SPACE, device="cpu", gae_lambda=0.95, gamma=0.99, n_envs=SLOTS)
+    starts = np.zeros(SLOTS)
     for step in range(STEPS):
-        obs = rng.standard_normal((SEATS, 2)).astype(np.float32)
-        value, reward = torch.tensor(rng.standard_normal(SEATS)), rng.standard_normal(SEATS)
+        obs = rng.standard_normal((SLOTS, 2)).astype(np.float32)
+        value, reward = torch.tensor(rng.standard_normal(SLOTS)), rng.standard_normal(SLOTS)
         gone = step in away or (left is not None and step > left)
         if gone:
             obs[0], value[0], reward[0] = 0.0, zeros_worth, 0.0
         if step == left:
             reward[0] += 0.99 * zeros_worth  # what Stable-Baselines3 adds at the end
-        action = rng.standard_normal((SEATS, 2))
-        buffer.add(obs, action, reward, starts, value, torch.zeros(SEATS))
+        action = rng.standard_normal((SLOTS, 2))
+        buffer.add(obs, action, reward, starts, value, torch.zeros(SLOTS))
         starts = np.array([float(step == left), 0.0, 0.0])
     last = torch.tensor([[zeros_worth if gone else 0.3], [0.4], [0.5]])
-    buffer.compute_returns_and_advantage(last, np.zeros(SEATS))
+    buffer.compute_returns_and_advantage(last, np.zeros(SLOTS))
     return buffer
 
 

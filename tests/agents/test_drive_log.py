@@ -17,7 +17,7 @@ def drive_of(decisions, cycles):
     )
     group = SimpleNamespace(
         task=task,
-        believed=SimpleNamespace(present=np.ones((1, N), bool)),
+        estimated=SimpleNamespace(present=np.ones((1, N), bool)),
         t_ns=0,
         asked=np.zeros((N, 2)),
     )

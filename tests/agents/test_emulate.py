@@ -190,7 +190,7 @@ def test_faults_happen_to_what_they_are_aimed_at():
     faults = [
         Fault(t=0.5, kind="unplug", target="nodes.1", seconds=0.5),
         Fault(t=0.5, kind="reboot", target="nodes.2", seconds=0.3),
-        Fault(t=0.5, kind="twin", target="nodes.3", seconds=0.5),
+        Fault(t=0.5, kind="duplicate-id", target="nodes.3", seconds=0.5),
         Fault(t=0.5, kind="silence", target="cars.1", seconds=0.5),
         Fault(t=0.5, kind="reboot", target="cars.2", seconds=0.4),
         Fault(t=2.2, kind="unplug", target="links.operator", seconds=0.2),

@@ -30,7 +30,7 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(run, tmp_path, monkeypatch)
         raise OSError(28, "No space left on device")
 
     def fill(share, row):
-        if row is not None and row["leg"] == 0:
+        if row is not None and row["interval"] == 0:
             before.update({p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()})
             monkeypatch.setattr(Path, "replace", full)
 
@@ -67,7 +67,7 @@ def test_what_a_kill_left_of_the_first_file_is_in_nobodys_way(tmp_path):
 
 
 def test_weights_that_are_no_numbers_any_more_are_told(tmp_path):
-    with pytest.raises(UsageError, match=r"diverged in leg \d.*--learning-rate"):
+    with pytest.raises(UsageError, match=r"diverged in interval \d.*--learning-rate"):
         train(small(learning_rate="1", entropy="1", epochs="20"), tmp_path / "run")
 
 
@@ -98,7 +98,7 @@ def test_a_full_disk_is_told_whatever_is_being_written(run, tmp_path, monkeypatc
         assert same(weights(run.folder), weights(folder))
 
 
-@pytest.mark.parametrize("log", [5, [], [{}], [{"leg": 0, "frames": "x"}], [None]])
+@pytest.mark.parametrize("log", [5, [], [{}], [{"interval": 0, "frames": "x"}], [None]])
 def test_a_checkpoint_that_does_not_say_where_it_stands_is_refused(run, tmp_path, log):
     (tmp_path / CONFIG).write_text((run.folder / CONFIG).read_text())
     data = save(weights(run.folder), {"progress": json.dumps({"log": log})})

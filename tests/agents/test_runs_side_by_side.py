@@ -28,9 +28,9 @@ from agents.training.side_by_side import train_side_by_side
 from agents.training.train import train
 
 SMALL = {
-    "frames": "1400", "leg": "2", "envs": "3", "steps": "16", "batch": "64", "epochs": "2",
-    "eval_episodes": "2", "choice_episodes": "4", "seconds": "12", "width": "8", "threads": "2",
-    "seed": "3",
+    "frames": "1400", "eval_interval": "2", "envs": "3", "steps": "16", "batch": "64",
+    "epochs": "2", "eval_episodes": "2", "choice_episodes": "4", "seconds": "12", "width": "8",
+    "threads": "2", "seed": "3",
 }  # fmt: skip
 
 
@@ -61,8 +61,8 @@ def test_each_is_as_if_it_were_alone(two, tmp_path):
     strip = [{k: v for k, v in r.items() if k != "seconds"} for r in alone.records]
     other = [{k: v for k, v in r.items() if k != "seconds"} for r in result.records]
     assert other[3:] == [{"seed": 4, **r} for r in strip]
-    assert sorted((row["seed"], row["leg"]) for _, row in told if row) == [
-        (seed, leg) for seed in (3, 4) for leg in range(3)
+    assert sorted((row["seed"], row["interval"]) for _, row in told if row) == [
+        (seed, interval) for seed in (3, 4) for interval in range(3)
     ]
     shares = [share for share, _ in told]
     assert shares == sorted(shares)
@@ -76,7 +76,7 @@ def test_the_best_of_both_is_kept(two):
     assert choice.measured["return"] == max(r["return"] for r in choice.rows)
     assert {r["seed"] for r in choice.rows} == {3, 4}
     card = load_policy(folder / "two.onnx").card.training
-    assert (card["seed"], card["leg"]) == (result.best["seed"], result.best["leg"])
+    assert (card["seed"], card["interval"]) == (result.best["seed"], result.best["interval"])
     assert card["chosen_by"] == result.best
     assert "seeds 3 to 4" in (folder / "report.html").read_text()
     # The exported policy is that of the chosen run and iteration.
@@ -91,8 +91,8 @@ def test_the_choice_is_made_in_episodes_of_its_own(two):
     config = RunFolder(folder).config()
     again = choose(config, [folder / "seed-3", folder / "seed-4"])
     assert again.rows == read_choice(folder).rows
-    legs = {r["leg"]: r["return"] for r in result.records if r["seed"] == 4}
-    assert all(r["return"] != legs[r["leg"]] for r in again.rows if r["seed"] == 4)
+    intervals = {r["interval"]: r["return"] for r in result.records if r["seed"] == 4}
+    assert all(r["return"] != intervals[r["interval"]] for r in again.rows if r["seed"] == 4)
 
 
 def test_runs_that_were_stopped_go_on_as_if_they_had_not_been(two, tmp_path):
@@ -150,7 +150,9 @@ def tell():
 
 if __name__ == "__main__":
     threading.Thread(target=tell, daemon=True).start()
-    config = from_options(TrainConfig, {"leg": "10000", "envs": "3", "frames": "1000000000"})
+    config = from_options(
+        TrainConfig, {"eval_interval": "10000", "envs": "3", "frames": "1000000000"}
+    )
     train_side_by_side([config], [Path(sys.argv[1])], lambda *_: None)
 """
     script = tmp_path / "begin.py"
@@ -201,8 +203,8 @@ def test_the_command_trains_several_and_tells_them_apart(tmp_path):
     options = [f"--{k.replace('_', '-')}={v}" for k, v in given.items()]
     done = CliRunner().invoke(cli, ["train", "--out", str(tmp_path / "run"), "--json", *options])
     assert done.exit_code == 0, done.output
-    *legs, last = (json.loads(line) for line in done.stdout.splitlines())
-    assert {row["seed"] for row in legs} == {3, 4}
+    *intervals, last = (json.loads(line) for line in done.stdout.splitlines())
+    assert {row["seed"] for row in intervals} == {3, 4}
     assert last["result"] == "policy"
     assert last["seed"] in (3, 4)
     refused = CliRunner().invoke(

@@ -33,7 +33,7 @@ from agents.training.environments import (
 )
 from agents.training.evaluation import Evaluation
 from agents.training.export import export_policy, read_results
-from agents.training.ppo.learner import level_of, make_model, make_policy, run_leg
+from agents.training.ppo.learner import level_of, make_model, make_policy, run_interval
 from agents.training.ppo.network import Actor
 from agents.training.run import train_policy
 from agents.training.run_folder import BEST, LAST, RunFolder, restore_weights
@@ -70,7 +70,7 @@ def test_same_seed_same_weights(run, tmp_path):
 
 
 def test_a_run_begins_with_a_policy(run, policy, tmp_path):
-    config = small(begin=str(policy), seed="5", leg="1")
+    config = small(begin=str(policy), seed="5", eval_interval="1")
     model = make_model(config, make_rooms(config, None))
     begin_with(model.policy, config)
     trained = make_policy(small())
@@ -79,7 +79,7 @@ def test_a_run_begins_with_a_policy(run, policy, tmp_path):
     begun = {k: w.detach().clone() for k, w in Actor(model.policy).named_parameters()}
     assert all(torch.equal(w, given[k]) for k, w in begun.items())
     critic = model.policy.value_net.weight.detach().clone()
-    run_leg(model, config, 0)  # at first only the critic is trained
+    run_interval(model, config, 0)  # at first only the critic is trained
     assert all(torch.equal(w, begun[k]) for k, w in Actor(model.policy).named_parameters())
     assert not torch.equal(model.policy.value_net.weight, critic)
 
@@ -105,7 +105,7 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(run, tmp_path):
         pass
 
     def stop(share, row):
-        if row is not None and row["leg"] == 1:
+        if row is not None and row["interval"] == 1:
             raise Stop
 
     with pytest.raises(Stop):
@@ -274,8 +274,8 @@ def test_the_policy_of_the_last_leg_can_be_exported(run, tmp_path):
         load_policy(export_policy(run.folder, tmp_path, name=f"last-{k}", last=k)).card.training
         for k in (False, True)
     )
-    assert best["leg"] == run.progress.best_leg
-    assert last["leg"] == 2
+    assert best["interval"] == run.progress.best_interval
+    assert last["interval"] == 2
     assert last["measured"]["return"] == run.records[2]["return"]
     seen = np.zeros((1, Layout("estimate", 6, 1).size), np.float32)
     acted = load_policy(tmp_path / "last-True.onnx").driver(Layout("estimate", 6, 1)).act(seen)
@@ -348,7 +348,7 @@ def test_the_command_tells_every_leg_and_the_policy(tmp_path):
     done = CliRunner().invoke(cli, command)
     assert done.exit_code == 0, done.output
     rows = [json.loads(line) for line in done.stdout.splitlines()]
-    assert [r["leg"] for r in rows[:-1]] == [0, 1, 2]
+    assert [r["interval"] for r in rows[:-1]] == [0, 1, 2]
     assert rows[-1]["result"] == "policy"
     out = tmp_path / "policies"
     done = CliRunner().invoke(

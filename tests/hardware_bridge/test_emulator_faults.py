@@ -145,7 +145,7 @@ def test_errors_name_file_and_key(text, told, tmp_path):
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9)
-    | st.sampled_from(["unplug", "twin", "nodes.1", "cars.2", "links.n1"]),
+    | st.sampled_from(["unplug", "duplicate-id", "nodes.1", "cars.2", "links.n1"]),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=5),
     max_leaves=12,
 )  # fmt: skip

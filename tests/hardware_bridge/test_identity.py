@@ -143,7 +143,7 @@ def test_twins_are_found_within_four_messages(turns, period_ms):
         link, t = ("left" if first else "right"), k * period_ms * MS
         verdict = identities.check(link, numbered(boot, sequences[boot]), t, 3)
         sequences[boot] += 1
-        if verdict is Verdict.TWIN:
+        if verdict is Verdict.DUPLICATE_ID:
             break
     assert after_the_other <= 4
     assert identities.quarantined == (3,)
@@ -151,7 +151,7 @@ def test_twins_are_found_within_four_messages(turns, period_ms):
         "node 3 is two devices, on links left and right: refused until it is released"
     )
     for boot in (7, 8, 9):
-        assert identities.check("left", numbered(boot, 5000), t, 3) is Verdict.TWIN
+        assert identities.check("left", numbered(boot, 5000), t, 3) is Verdict.DUPLICATE_ID
     identities.release(3, t)
     assert identities.check("left", numbered(7, 5001), t, 3) is Verdict.FRESH
     assert texts(identities)[-1] == "node 3 is released"
@@ -170,7 +170,7 @@ def test_a_device_that_comes_back_after_its_twin_is_found_by_one_message():
     identities = Identities()
     for k, boot in enumerate([1, 2]):
         identities.check("a", numbered(boot, k), k * S, 3)
-    assert identities.check("a", numbered(1, 5), 3600 * S, 3) is Verdict.TWIN
+    assert identities.check("a", numbered(1, 5), 3600 * S, 3) is Verdict.DUPLICATE_ID
     assert "both on link a" in texts(identities)[-1]
 
 
@@ -198,8 +198,8 @@ def test_spoofed_boots_fill_no_memory_and_are_quarantined():
     verdicts = [
         identities.check("a", numbered(rng.getrandbits(32), 0), k * MS, 3) for k in range(1000)
     ]
-    assert verdicts.index(Verdict.TWIN) == 9
-    assert set(verdicts[9:]) == {Verdict.TWIN}
+    assert verdicts.index(Verdict.DUPLICATE_ID) == 9
+    assert set(verdicts[9:]) == {Verdict.DUPLICATE_ID}
     assert len(identities.notices) < 5
     slowly = Identities()
     for k in range(1000):
@@ -258,7 +258,7 @@ def test_one_id_on_two_links_is_two_devices():
     identities = Identities()
     source = Source(device="3")
     verdicts = [identities.check("ab"[k % 2], source, k * 10 * MS, 3) for k in range(10)]
-    assert verdicts.index(Verdict.TWIN) == 3
+    assert verdicts.index(Verdict.DUPLICATE_ID) == 3
     assert texts(identities)[0].startswith("node 3 is two devices, on links a and b")
 
 

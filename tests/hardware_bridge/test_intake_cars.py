@@ -75,7 +75,7 @@ def test_no_other_device_speaks_on_its_line(swarm):
         says(swarm, node, S, MOVES)
     swarm.step(S)
     assert not swarm.view.speed.any()
-    assert swarm.intake.refused["stranger"] == 3
+    assert swarm.intake.refused["unknown_device"] == 3
     texts = [text for _, text in swarm.intake.notices]
     assert texts[0] == "cars.1: device 2 sends on its line, and is not that car"
     assert len(texts) == 3
@@ -85,7 +85,7 @@ def test_no_other_device_speaks_on_its_line(swarm):
 def test_it_says_nothing_but_what_a_controller_says(swarm, node, reading):
     says(swarm, node, S, reading)
     swarm.step(S)
-    assert swarm.intake.refused == {"stranger": 1}
+    assert swarm.intake.refused == {"unknown_device": 1}
     assert not swarm.trim.any()
     assert len(swarm.intake.events) == 0
     assert not np.isfinite(swarm.t_last_message()).any()

@@ -151,7 +151,7 @@ def test_a_reset_arms_and_lets_cars_find_each_other():
     env = bridge.env(max_cycles=5)
     env.reset()
     assert [text for _, text in bridge.feed.notices] == ["arm"]
-    assert env.group.believed.complete
+    assert env.group.estimated.complete
     assert bridge.feed.report.armed.all()
     t_ns = bridge.feed.t_ns
     assert t_ns > START_NS

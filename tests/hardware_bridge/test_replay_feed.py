@@ -26,7 +26,7 @@ FRAMES = FaultParams(
 SCRIPT = (
     Fault(t=1.0, kind="unplug", target="nodes.1", seconds=0.6),
     Fault(t=1.5, kind="reboot", target="nodes.2", seconds=0.3),
-    Fault(t=2.0, kind="twin", target="nodes.3", seconds=0.5),
+    Fault(t=2.0, kind="duplicate-id", target="nodes.3", seconds=0.5),
     Fault(t=2.5, kind="clock-step", target="nodes.1", seconds=5.0),
     Fault(t=2.5, kind="stuck-sensor", target="nodes.2", seconds=0.5),
     Fault(t=3.0, kind="unplug", target="nodes.2", seconds=5.5),
@@ -67,7 +67,7 @@ def test_replay_is_live(tmp_path, faults, format, decisions):
     assert run.recorder.lost is None
     if faults.faults:
         assert len(run.rig.emulator.happened) == len(SCRIPT)
-        assert {"duplicate", "twin"} <= run.refused.keys()
+        assert {"duplicate", "duplicate_id"} <= run.refused.keys()
     feed = open_replay(run.path)
     history, views = again(feed)
     np.testing.assert_array_equal(history.t_ns, run.t_ns)

@@ -153,12 +153,12 @@ WRONG = {
     "unknown driver": (lambda t: t.replace('driver = "relpos"', 'driver = "rc"'), "driver"),
     "car that cannot drive slowly": (
         lambda t: t.replace('driver = "relpos"', 'driver = "pwm"', 1), "cars.1.options",
-        "slower than 0.4 m/s it stands", "teach it to drive slower",
+        "slower than 0.4 m/s it stops", "teach it to drive slower",
     ),
     "slow that is too slow for a VESC": (
         lambda t: t.replace('driver = "relpos"', 'driver = "vesc"', 1).replace(
             "[safety]\n", "[safety]\nslow = 0.1\n"
-        ), "cars.1.options", "slower than 0.2 m/s it stands", "raise slow",
+        ), "cars.1.options", "slower than 0.2 m/s it stops", "raise slow",
     ),
     "limit that is none": (
         lambda t: t.replace("[safety]\n", "[safety]\nstale_stop = 0.1\n"), "stale_slow",
@@ -183,7 +183,7 @@ WRONG = {
             'driver = "relpos"',
             'driver = "pwm"\noptions = { forward = [[0.2, 1560], [3.0, 1750]], '
             "reverse = [[0.6, 1440], [3.0, 1250]] }", 1
-        ), "cars.1.options", "slower than 0.6 m/s it stands",
+        ), "cars.1.options", "slower than 0.6 m/s it stops",
     ),
     "no TOML": (lambda t: t + "]", "expected TOML"),
 }  # fmt: skip

@@ -166,14 +166,14 @@ def test_stuck_sensor(drive, usual):
 
 def test_two_nodes_with_one_id(drive):
     each = drive()
-    each.drive(2.0).befall("twin", "nodes.1", 1.5)
+    each.drive(2.0).befall("duplicate-id", "nodes.1", 1.5)
     each.drive(1.0)
     assert each.notices[:2] == [
         "node 1 started again, on link links.n1",
         "node 1 is two devices, both on link links.n1: refused until it is released",
     ]
     assert not each.armed[0]
-    assert each.swarm.intake.refused["twin"] > 100
+    assert each.swarm.intake.refused["duplicate_id"] > 100
     each.drive(2.0)
     each.order("arm")
     assert not each.supervisor.report().armed[0], "quarantined, though one of them is gone"
@@ -315,7 +315,7 @@ def test_everything_at_once(drive, usual):
     frames = FaultParams(loss=0.01, corruption=0.005, duplication=0.01, reordering=0.01)
     each = drive(faults=FaultPlan(frames=frames))
     n = len(each.errors)
-    kinds = ["reboot", "clock-step", "stuck-sensor", "silence", "unplug", "twin"]
+    kinds = ["reboot", "clock-step", "stuck-sensor", "silence", "unplug", "duplicate-id"]
     things = [(kind, f"nodes.{1 + k % 3}") for k, kind in enumerate(kinds)]
     things += [("unplug", "cars.1"), ("reboot", "cars.2"), ("silence", "cars.3"),
                ("unplug", "links.operator")]  # fmt: skip

@@ -15,7 +15,7 @@ from hardware_bridge.links.ports import PortSpec
 from hardware_bridge.live.marks import KeptMarks
 from hardware_bridge.live.silent_cars import GROWTH, SILENT, SilentCars
 from hardware_bridge.readings import UNNAMED, AckReading, MotionReading, Source, StatusReading
-from hardware_bridge.safety.believed import Believed
+from hardware_bridge.safety.message_filter import MessageFilter
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.safety.picture import blank_picture
 from hardware_bridge.safety.supervisor import Supervisor
@@ -183,7 +183,7 @@ def test_words_of_others_and_old_ones_are_not_listened_to():
 
     port = PortSpec(name="cars.1", port="/dev/null")
     car = CarConfig(node=1, port=port, driver="relpos", key=bytes(16))
-    believed = Believed(car, {1: (5, 2)})
+    message_filter = MessageFilter(car, {1: (5, 2)})
     said = [
         status(2, 0),
         status(3, 1),
@@ -191,10 +191,14 @@ def test_words_of_others_and_old_ones_are_not_listened_to():
         status(4, 0, device="7"),
         status(1, 0, boot=4),
     ]
-    assert [reading.fault for reading in believed.sift(said, 0)] == [1]
+    assert [reading.fault for reading in message_filter.sift(said, 0)] == [1]
     drive = ready()
     drive.supervisor = Supervisor(
-        SafetyParams(), 2, drive.drivers, {0: "cars.1", 1: "cars.2"}, believed={0: believed}
+        SafetyParams(),
+        2,
+        drive.drivers,
+        {0: "cars.1", 1: "cars.2"},
+        message_filters={0: message_filter},
     )
     drive.tick(60)
     drive.arm()

@@ -72,7 +72,7 @@ def vector_run(env, seed, steps):
     return trace, taken
 
 
-def seats_run(env, seed, steps):
+def slots_run(env, seed, steps):
     """Return all results of some steps of the Stable-Baselines3 form, with the actions."""
     env.seed(seed)
     rng, trace = np.random.default_rng(7), [env.reset()]

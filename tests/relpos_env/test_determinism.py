@@ -99,13 +99,13 @@ def test_one_seed_is_one_series_of_episodes_in_every_form():
 
     kwargs = {"physics": "fast", "max_cycles": 5}
     one, team = parallel_env(**kwargs), FormationGymEnv(**kwargs)
-    batch, seats = FormationVectorEnv(2, **kwargs), FormationVecEnv(2, **kwargs)
-    seats.seed(8)
+    batch, slots = FormationVectorEnv(2, **kwargs), FormationVecEnv(2, **kwargs)
+    slots.seed(8)
     for seed in (8, None):
         cars = np.stack(list(one.reset(seed=seed)[0].values()))
         assert bits(cars.ravel()) == bits(team.reset(seed=seed)[0])
         assert bits(cars.ravel()) == bits(batch.reset(seed=seed)[0][0])
-        assert bits(cars) == bits(seats.reset()[:3])
+        assert bits(cars) == bits(slots.reset()[:3])
     assert bits(batch.np_random.random()) == bits(np.random.default_rng(8).random())
     assert one.np_random is one._rng
 

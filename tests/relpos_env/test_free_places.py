@@ -8,7 +8,7 @@ from relpos_env.config import FormationConfig
 from relpos_env.scenarios.rooms.overlap import distance
 from relpos_env.tasks.geometry.anchor import CLEAR, STEP, free_anchor
 from relpos_env.tasks.geometry.curves import make_curve
-from relpos_env.tasks.moving import Motion, Stand
+from relpos_env.tasks.moving import AnchorPlacement, Motion
 
 SQUARE = 0.5 * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
 BOX = np.array([[0.5, 0.5, 0.2, 0.2, 1.0, 0.0]])
@@ -70,6 +70,6 @@ def test_no_place_of_a_standing_formation_is_in_an_obstacle(scenario):
 
 def test_a_frame_that_follows_a_curve_does_not_stand():
     curve = make_curve("loop", True, np.array([3.0, 3.0]), np.array([0.5, 0.5]))
-    stand = Stand(half=(1.0, 1.0), room=(3.0, 3.0))
-    with pytest.raises(ValueError, match="stand: expected none"):
-        Motion(curve=curve, stand=stand)
+    placement = AnchorPlacement(half=(1.0, 1.0), room=(3.0, 3.0))
+    with pytest.raises(ValueError, match="placement: expected none"):
+        Motion(curve=curve, placement=placement)

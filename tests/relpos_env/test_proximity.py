@@ -40,7 +40,8 @@ def read(
     out = np.full((e, n, n_rangefinders), np.nan)
     read_proximity(
         as_records(p), np.array(seeds, dtype=np.uint64), np.full(e, tick),
-        rangefinder_directions(n_rangefinders), body, present, np.tile(SIZE, (e, 1)), np.tile(room, (e, 1)), rows, out,
+        rangefinder_directions(n_rangefinders), body, present, np.tile(SIZE, (e, 1)),
+        np.tile(room, (e, 1)), rows, out,
     )  # fmt: skip
     return out
 

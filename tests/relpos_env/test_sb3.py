@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from runs import bits, busy, seats_run
+from runs import bits, busy, slots_run
 
 pytest.importorskip("stable_baselines3")
 
@@ -58,7 +58,7 @@ def test_training_while_cars_come_and_go(actions):
 @pytest.mark.parametrize("kwargs", [BUSY, {"max_cycles": 15, "actions": "discrete"}])
 def test_same_seed_same_run(kwargs):
     runs = [
-        bits(seats_run(FormationVecEnv(3, threads=threads, **kwargs), seed, 100)[0])
+        bits(slots_run(FormationVecEnv(3, threads=threads, **kwargs), seed, 100)[0])
         for seed, threads in ((4, 1), (4, 2), (5, 1))
     ]
     assert runs[0] == runs[1] != runs[2]
@@ -69,18 +69,18 @@ def test_same_seed_same_run(kwargs):
 )
 def test_seats_are_the_agents_of_the_pettingzoo_form(kwargs):
     vec = FormationVecEnv(2, **kwargs)
-    trace, taken = seats_run(vec, 30, 120)
+    trace, taken = slots_run(vec, 30, 120)
     n, left = vec.n_cars, 0
     for e in range(2):
         env = parallel_env(**kwargs)
         rows = slice(e * n, (e + 1) * n)
         observations, _ = env.reset(seed=30 + e)
-        check_seats(env, observations, trace[0][rows])
+        check_slots(env, observations, trace[0][rows])
         for (seen, rewards, dones, infos), actions in zip(trace[1:], taken, strict=True):
-            seats = {f"car_{k}": row for k, row in enumerate(range(n * e, n * e + n))}
-            commanded = {a: actions[seats[a]] for a in env.agents}
+            slots = {f"car_{k}": row for k, row in enumerate(range(n * e, n * e + n))}
+            commanded = {a: actions[slots[a]] for a in env.agents}
             observations, reward, terminated, truncated, told = env.step(commanded)
-            for agent, row in seats.items():
+            for agent, row in slots.items():
                 assert rewards[row] == np.float32(reward.get(agent, 0.0))
                 over = terminated.get(agent, False) or truncated.get(agent, False)
                 assert dones[row] == (over or not env.agents)
@@ -92,11 +92,11 @@ def test_seats_are_the_agents_of_the_pettingzoo_form(kwargs):
             left += bool(env.agents) and any(truncated.values())
             if not env.agents:
                 observations, _ = env.reset()
-            check_seats(env, observations, seen[rows])
+            check_slots(env, observations, seen[rows])
     assert left > 0
 
 
-def check_seats(env, observations, rows):
+def check_slots(env, observations, rows):
     for agent, row in zip(env.possible_agents, rows, strict=True):
         if agent in env.agents:
             assert bits(row) == bits(observations[agent])
@@ -110,10 +110,10 @@ def test_seats_without_a_car_are_marked():
     env.reset()
     for _ in range(20):
         *_, infos = env.step(np.zeros((env.num_envs, 2), np.float32))
-        for seat in np.nonzero(~env.active)[0]:
-            assert infos[seat].get("active") is False or "terminal_observation" in infos[seat]
-        for seat in np.nonzero(env.active)[0]:
-            assert "active" not in infos[seat]
+        for slot in np.nonzero(~env.active)[0]:
+            assert infos[slot].get("active") is False or "terminal_observation" in infos[slot]
+        for slot in np.nonzero(env.active)[0]:
+            assert "active" not in infos[slot]
 
 
 def test_in_processes_of_its_own():

@@ -160,5 +160,5 @@ def test_impossible_gaps_are_named():
         with pytest.raises(EnvError, match=message):
             s.with_gap(gap)
     box = Obstacle(x=0.0, y=0.0, width=0.2, height=0.2)
-    with pytest.raises(EnvError, match=r"gap: obstacles\[2\] stands in it"):
+    with pytest.raises(EnvError, match=r"gap: obstacles\[2\] blocks it"):
         replace(s, obstacles=(*s.obstacles, box))

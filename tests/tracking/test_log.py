@@ -114,7 +114,7 @@ def test_other_structural_faults_are_named(folder):
         (good + '9.0,1,3,"2.0', "not a CSV"),
         (good + "1.7e9,1,3,2.0\n", "row 32, t_s: jumps"),
         (good + "9.0,1,3\n", "row 32: expected 4 fields"),
-        (good.replace("range_m", "node_i"), "stands there twice"),
+        (good.replace("range_m", "node_i"), "duplicate column"),
     ):
         ranges.write_text(text)
         with pytest.raises(LogError, match=word):

@@ -23,7 +23,7 @@ from tracking.kernels.jit import small_kernel
 UNIT = 0.01 * math.pi / 180.0
 """[rad/s] Unit of the bias covariance."""
 
-ROTATION, LEAN, BIAS, P = 0, 9, 33, 36
+ROTATION, HORIZONTAL_RATE, BIAS, P = 0, 9, 33, 36
 N_BIAS = 42
 """Columns of the memory: low passes of the rotation, row by row, and of the horizontal rates
 caused by the bias [rad/s], one filter with 11 signals; the bias [rad/s]; the upper triangle of
@@ -91,8 +91,8 @@ def estimate_bias(bias, rest, c, e, n, count, qw, qx, qy, qz, tilt_x, tilt_y):
     bias[e, n, at], bias[e, n, at + 1], bias[e, n, at + 2] = r00, r01, r02
     bias[e, n, at + 3], bias[e, n, at + 4], bias[e, n, at + 5] = r10, r11, r12
     bias[e, n, at + 6], bias[e, n, at + 7], bias[e, n, at + 8] = r20, r21, r22
-    bias[e, n, LEAN] = r00 * b0 + r01 * b1 + r02 * b2
-    bias[e, n, LEAN + 1] = r10 * b0 + r11 * b1 + r12 * b2
+    bias[e, n, HORIZONTAL_RATE] = r00 * b0 + r01 * b1 + r02 * b2
+    bias[e, n, HORIZONTAL_RATE + 1] = r10 * b0 + r11 * b1 + r12 * b2
     low_pass(bias, e, n, ROTATION, 11, count, c.tilt_pass, n)
     if rest[e, n, RESTING] != 0.0:
         r00, r01, r02 = 1.0, 0.0, 0.0
@@ -107,8 +107,10 @@ def estimate_bias(bias, rest, c, e, n, count, qw, qx, qy, qz, tilt_x, tilt_y):
         r10, r11, r12 = bias[e, n, at + 3], bias[e, n, at + 4], bias[e, n, at + 5]
         r20, r21, r22 = bias[e, n, at + 6], bias[e, n, at + 7], bias[e, n, at + 8]
         rate = 1.0 / c.dt[n]
-        e0 = clip(c, bias[e, n, LEAN] - tilt_y * rate - (r00 * b0 + r01 * b1 + r02 * b2))
-        e1 = clip(c, bias[e, n, LEAN + 1] + tilt_x * rate - (r10 * b0 + r11 * b1 + r12 * b2))
+        e0 = clip(c, bias[e, n, HORIZONTAL_RATE] - tilt_y * rate - (r00 * b0 + r01 * b1 + r02 * b2))
+        e1 = clip(
+            c, bias[e, n, HORIZONTAL_RATE + 1] + tilt_x * rate - (r10 * b0 + r11 * b1 + r12 * b2)
+        )
         e2 = clip(c, -(r20 * b0 + r21 * b1 + r22 * b2))
         w0, w2 = c.motion_var[n], c.vertical_var[n]
 

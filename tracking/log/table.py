@@ -69,7 +69,7 @@ class Table:
         header = [name.strip() for name in rows[0]]
         twice = [name for name in header if header.count(name) > 1]
         if twice:
-            raise LogError(f"{path.name}: column {twice[0]!r} stands there twice")
+            raise LogError(f"{path.name}: duplicate column {twice[0]!r}")
         missing = [name for name in required if name not in header]
         if missing:
             raise LogError(

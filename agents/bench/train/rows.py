@@ -17,7 +17,7 @@ from agents.bench.train.nothing import Nothing
 from agents.bench.train.plain import make_plain
 from agents.training.config import TrainConfig
 from agents.training.environments import make_rooms
-from agents.training.ppo.learner import learn, make_model, run_leg
+from agents.training.ppo.learner import learn, make_model, run_interval
 
 Row = dict[str, Any]
 TURNS = 3
@@ -53,17 +53,17 @@ def bench_train(
     torch.set_num_threads(threads)
     rows: list[Row] = []
     for case, scenarios in CASES.items():
-        config = TrainConfig(frames=10**9, threads=threads, leg=updates)
+        config = TrainConfig(frames=10**9, threads=threads, eval_interval=updates)
         config = replace(config, env=replace(config.env, scenarios=scenarios))
         rooms = make_rooms(config, None)
         ours = _quiet(make_model(config, rooms))
         # Compiles the kernels, and drives the cars away from their initial positions.
-        run_leg(ours, replace(config, leg=after), 0)
+        run_interval(ours, replace(config, eval_interval=after), 0)
         nothing = Nothing(rooms, rooms.reset())
         plain = _quiet(make_plain(make_model(config, nothing)))
         same = _quiet(make_model(config, nothing))
         for peer in (plain, same):
-            run_leg(peer, replace(config, leg=1), 0)
+            run_interval(peer, replace(config, eval_interval=1), 0)
         turns = [_turn(model, config) for model in (ours, plain, same)]
         us, *peers_us = best_of_turns(turns, TURNS)
         rooms.close()
@@ -92,13 +92,13 @@ def _quiet(model: PPO) -> PPO:
 
 
 def _turn(model: PPO, config: TrainConfig) -> Callable[[], float]:
-    """Return a function that measures the time per agent step over `config.leg` updates [us]."""
+    """Return a function that measures the time per agent step over an interval [us]."""
     env: VecEnv = model.env
 
     def turn() -> float:
         start = time.perf_counter()
         learn(model, config)
-        frames = config.leg * config.ppo.steps * env.num_envs
+        frames = config.eval_interval * config.ppo.steps * env.num_envs
         return 1e6 * (time.perf_counter() - start) / float(frames)
 
     return turn

@@ -67,7 +67,7 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: Any) ->
         "The policy that is kept",
         ["", ""],
         [
-            ["seed, leg, frames", f"{best['seed']}, {best['leg']}, {best['frames']}"],
+            ["seed, interval, frames", f"{best['seed']}, {best['interval']}, {best['frames']}"],
             ["formation error [m]", f"{best['formation_error']:.3f}"],
             ["tracking error [m]", metres(best["tracking_error"])],
             ["collisions per minute", f"{best['collisions_per_min']:.2f}"],
@@ -83,7 +83,7 @@ def _option(name: str) -> str:
 def _line(row: dict[str, Any]) -> str:
     rate = row["frames"] / max(row["seconds"], 1e-9)
     return (
-        f"seed {row['seed']}  leg {row['leg']:3d}  {row['frames']:>11,d} frames  {rate:7.0f}/s  "
-        f"return {row['return']:6.3f}  formation {row['formation_error']:.3f} m  "
+        f"seed {row['seed']}  interval {row['interval']:3d}  {row['frames']:>11,d} frames  "
+        f"{rate:7.0f}/s  return {row['return']:6.3f}  formation {row['formation_error']:.3f} m  "
         f"collisions {row['collisions_per_min']:.2f}/min"
     )

@@ -43,7 +43,7 @@ class DriveLog:
     def add(self) -> None:
         """Append the state after a control step."""
         group, report = self._env.group, self._bridge.feed.report
-        present, task = group.believed.present[0], group.task
+        present, task = group.estimated.present[0], group.task
         k = self._n % len(self._t_ns)
         self._began_ns = self._began_ns if self._n else group.t_ns
         self._n += 1

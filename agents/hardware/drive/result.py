@@ -68,7 +68,7 @@ class DriveResult:
             "armed": self.armed,
             "seconds": round(self.seconds, 3),
             "decisions": self.decisions,
-            "believed_error": float(error.mean()) if len(error) else None,
+            "estimated_error": float(error.mean()) if len(error) else None,
             "lag_p50_ms": 1e3 * float(np.quantile(lag, 0.5)) if len(lag) else None,
             "lag_p99_ms": 1e3 * float(np.quantile(lag, 0.99)) if len(lag) else None,
             "gated_share": float(held.mean()) if self.armed and len(held) else None,

@@ -108,8 +108,8 @@ def drive_on(
     entry = find_entry(name)
     if entry.proximity is not None and entry.proximity != n_rangefinders:
         raise UsageError(
-            f"{name}: expected {entry.proximity} distance sensors, the cars have {n_rangefinders}: see proximity of "
-            "[task]"
+            f"{name}: expected {entry.proximity} distance sensors, the cars have "
+            f"{n_rangefinders}: see proximity of [task]"
         )
     seen = observation or entry.trained_on or "estimate"
     if seen == "truth":

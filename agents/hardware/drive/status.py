@@ -49,7 +49,7 @@ def car_rows(bridge: OpenBridge, env: HardwareFormationEnv) -> list[list[str]]:
 def status_record(bridge: OpenBridge, env: HardwareFormationEnv) -> dict[str, Any]:
     """Return the state of a drive as a JSON record."""
     report, group = bridge.feed.report, env.group
-    present = group.believed.present[0]
+    present = group.estimated.present[0]
     error = group.task.error[0, present]
     return {
         "result": "second",

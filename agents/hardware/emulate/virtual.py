@@ -23,8 +23,8 @@ from hardware_bridge.live.feed import DECISION_NS
 from hardware_bridge.live.opened import OpenBridge
 from hardware_bridge.live.start import Start, StartParams
 from hardware_bridge.live.swarm import LiveSwarm, load_calibration
-from hardware_bridge.safety.believed import Believed
 from hardware_bridge.safety.charge import REPORT_EVERY
+from hardware_bridge.safety.message_filter import MessageFilter
 from hardware_bridge.safety.messages import Decision, Message, Notice, Order, Report, Word
 from hardware_bridge.safety.picture import Picture
 from hardware_bridge.safety.supervisor import Supervisor
@@ -72,7 +72,7 @@ class VirtualFeed:
             names,
             cells={config.slot_of(car): car.cells for car in config.cars},
             watchdog={config.slot_of(car): car.watchdog for car in config.cars if car.watchdog},
-            believed={config.slot_of(car): Believed(car, {}) for car in config.cars},
+            message_filters={config.slot_of(car): MessageFilter(car, {}) for car in config.cars},
         )
         """Gate and drivers of the cars, read-only for observers."""
         self._up: set[int] = set()

@@ -112,7 +112,7 @@ def diagnose_link(
         report.problems += _flaws(report, hearing, seconds)
         report.problems += _wrong_rates(report, nodes, seconds)
         report.problems += _wrong_samples(link, voices, nodes)
-        report.problems += _strangers(link, voices)
+        report.problems += _unassigned_devices(link, voices)
     if losses:
         report.problems.append(_lost(losses))
     return report
@@ -273,7 +273,7 @@ def _wrong_rates(report: LinkReport, nodes: Mapping[int, NodeConfig], seconds: f
     ]
 
 
-def _strangers(link: LinkLike, voices: Mapping[str | None, Voice]) -> list[str]:
+def _unassigned_devices(link: LinkLike, voices: Mapping[str | None, Voice]) -> list[str]:
     """Return the devices that the configuration does not assign to a node."""
     devices: dict[str | None, None] = {}
     for device, voice in voices.items():

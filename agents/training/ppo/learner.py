@@ -98,18 +98,18 @@ def make_policy(config: TrainConfig) -> SwarmPolicy:
     return SwarmPolicy(space, ContinuousActions().space(), lambda _: 0.0, **arguments)
 
 
-def run_leg(
-    model: PPO, config: TrainConfig, leg: int, tell: Callable[[int], None] | None = None
+def run_interval(
+    model: PPO, config: TrainConfig, interval: int, tell: Callable[[int], None] | None = None
 ) -> None:
     """Train for one evaluation interval, beginning with new episodes.
 
     Args:
         model: Learner.
         config: Configuration of the run.
-        leg: Index of the evaluation interval.
+        interval: Index of the evaluation interval.
         tell: Called with the agent steps of the run so far, after every rollout.
     """
-    seeds = np.random.SeedSequence([config.seed, leg]).generate_state(2)
+    seeds = np.random.SeedSequence([config.seed, interval]).generate_state(2)
     set_random_seed(int(seeds[0] >> 1))
     model.env.seed(int(seeds[1] >> 1))
     # Without a last observation, `learn` begins with a reset.
@@ -118,8 +118,8 @@ def run_leg(
 
 
 def learn(model: PPO, config: TrainConfig, tell: Callable[[int], None] | None = None) -> None:
-    """Train for one evaluation interval without resetting the episodes; `tell`: see `run_leg`."""
-    frames = config.leg * config.ppo.steps * model.n_envs
+    """Train for one evaluation interval without resetting the episodes; see `run_interval`."""
+    frames = config.eval_interval * config.ppo.steps * model.n_envs
     callbacks: list[BaseCallback] = [_Threads(config.threads), _Noise(config)]
     if tell is not None:
         callbacks.append(_Tells(tell))
@@ -127,7 +127,7 @@ def learn(model: PPO, config: TrainConfig, tell: Callable[[int], None] | None = 
         callbacks.append(_Weights(config))
     if config.begin:
         callbacks.append(_CriticAlone(config))
-    model.learn(frames, callbacks, reset_num_timesteps=False, log_interval=config.leg)
+    model.learn(frames, callbacks, reset_num_timesteps=False, log_interval=config.eval_interval)
 
 
 class _Tells(BaseCallback):  # type: ignore[misc]

@@ -97,7 +97,7 @@ class SwarmFeatures(BaseFeaturesExtractor):  # type: ignore[misc]
         if self._has_places:
             off = seen.index_select(1, self._place_pos) - seen.index_select(1, self._place_target)
             known = seen.index_select(1, self._place_mask)
-            both = known * seen.index_select(1, self._place_wanted) / ERROR_SCALE
+            both = known * seen.index_select(1, self._place_has_target) / ERROR_SCALE
             error = self._by_other((off * both).clamp(-LIMIT, LIMIT))
             others = torch.cat([others, error], dim=-1)
         known, has_target = seen.index_select(1, self._mask), seen.index_select(1, self._has_target)
@@ -180,27 +180,27 @@ class _Where:
     def __init__(self, fields: Sequence[Field], history: int) -> None:
         n_others = next(f.size for f in fields if f.name == "mask")
         one = sum(f.size for f in fields)
-        stands: dict[str, I64] = {}
+        indices: dict[str, I64] = {}
         first = 0
         for f in fields:
             # (history, other or 1, number)
             index = first + np.arange(f.size) + one * np.arange(history)[:, None]
-            stands[f.name] = index.reshape(history, n_others if f.per_other else 1, -1)
+            indices[f.name] = index.reshape(history, n_others if f.per_other else 1, -1)
             first += f.size
         self.size = one * history
-        self.others = _join([stands[f.name] for f in fields if f.per_other])
-        self.own = _join([stands[f.name] for f in fields if not f.per_other])[0]
-        self.near = stands["near"].ravel() if "near" in stands else None
+        self.others = _join([indices[f.name] for f in fields if f.per_other])
+        self.own = _join([indices[f.name] for f in fields if not f.per_other])[0]
+        self.near = indices["near"].ravel() if "near" in indices else None
         # A car is valid if its newest observation has a position or a target.
-        self.newest = {n: np.ascontiguousarray(stands[n][0, :, 0]) for n in ("mask", "has_target")}
+        self.newest = {n: np.ascontiguousarray(indices[n][0, :, 0]) for n in ("mask", "has_target")}
         self.gain = np.ones(self.size, np.float32)
         for f in fields:
-            self.gain[stands[f.name].ravel()] = 1.0 / SCALES.get(f.name, 1.0)
+            self.gain[indices[f.name].ravel()] = 1.0 / SCALES.get(f.name, 1.0)
         self.places: dict[str, I64] | None = None
-        if "pos" in stands:
+        if "pos" in indices:
             # For each coordinate of each observation: position, target and their masks.
-            twice = {n: np.repeat(stands[n], 2, axis=-1) for n in ("mask", "has_target")}
-            named = {"pos": stands["pos"], "target": stands["target"], **twice}
+            twice = {n: np.repeat(indices[n], 2, axis=-1) for n in ("mask", "has_target")}
+            named = {"pos": indices["pos"], "target": indices["target"], **twice}
             self.places = {f"place_{n}": _join([index]) for n, index in named.items()}
 
 

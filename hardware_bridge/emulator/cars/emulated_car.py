@@ -46,8 +46,8 @@ class EmulatedCar:
         """Return speed [m/s] and steering [rad]; the steering angle is kept at a stop."""
         if self._last is None:
             return 0.0, 0.0
-        stands = self._last.brake or self.is_stopped(t_ns)
-        return 0.0 if stands else self._last.speed, self._last.steering
+        stopped = self._last.brake or self.is_stopped(t_ns)
+        return 0.0 if stopped else self._last.speed, self._last.steering
 
     def encode(self, readings: list[Reading]) -> bytes:
         """Return the bytes to send, see `CarFirmware.encode`."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from relpos_env.interface._observation_kernels import FAR, LOUD, OLD, observe_ranges
 from relpos_env.interface.observations.base import F32, Field
-from relpos_env.interface.observations.standard_fields import own_fields, wish_fields
+from relpos_env.interface.observations.standard_fields import own_fields, target_fields
 from relpos_env.interface.views import AgentView
 from tracking.kernels.jit import bind
 
@@ -33,7 +33,7 @@ class Ranges:
             Field(
                 "gap", n, "dB", "received less first-path power of that range", LOUD, per_other=True
             ),
-            *wish_fields(n),
+            *target_fields(n),
             *own_fields(n_rangefinders),
         )
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from relpos_env.interface._observation_kernels import FAR, FAST, N_STATUS, OLD, observe_relative
 from relpos_env.interface.observations.base import F32, Field
-from relpos_env.interface.observations.standard_fields import own_fields, wish_fields
+from relpos_env.interface.observations.standard_fields import own_fields, target_fields
 from relpos_env.interface.views import AgentView
 from tracking.kernels.jit import bind
 
@@ -65,7 +65,7 @@ class RelativePositions:
             ),
             Field("vel", 2 * n, "m/s", "its velocity relative to this car", FAST, per_other=True),
             *(certainty if with_cov else ()),
-            *wish_fields(n),
+            *target_fields(n),
             *own_fields(n_rangefinders),
         )
 

@@ -7,7 +7,7 @@ from relpos_env.interface.observations.base import Field
 from relpos_env.interface.rangefinders import FARTHEST
 
 
-def wish_fields(n_others: int) -> tuple[Field, ...]:
+def target_fields(n_others: int) -> tuple[Field, ...]:
     """Return the fields of the relative targets of the other cars."""
     return (
         Field(

@@ -24,7 +24,7 @@ def squats(size: SkeletonSize, path: Path, way: float, dt: float, rng: np.random
         rng: Generator of number, depth and rate.
     """
     n, period = int(rng.integers(4, 9)), rng.uniform(1.4, 2.4)
-    deep, lean, reach = rng.uniform([0.30, 0.35, 0.6], [0.50, 0.65, 1.5])
+    deep, tilt, reach = rng.uniform([0.30, 0.35, 0.6], [0.50, 0.65, 1.5])
     t = step_times(n * period, dt)
     wobble = 0.08 * rng.standard_normal(2)
     phase = 2.0 * np.pi * t / period
@@ -42,8 +42,8 @@ def squats(size: SkeletonSize, path: Path, way: float, dt: float, rng: np.random
         pose=replace(
             pose,
             pelvis_w=pelvis,
-            pelvis_tilt=0.45 * lean * down,
-            lean=0.55 * lean * down,
+            pelvis_tilt=0.45 * tilt * down,
+            trunk_tilt=0.55 * tilt * down,
             flexion=pose.flexion + reach * both,
             elbow=pose.elbow + 0.15 * both,
         ),

@@ -65,7 +65,7 @@ def walking(
         pelvis_w=pelvis,
         pelvis_turn=-turn * wave,
         twist=2.0 * turn * wave,
-        lean=0.06 * level,
+        trunk_tilt=0.06 * level,
         ball_w=np.stack([ball for ball, _, _ in feet], axis=1),
         foot_yaw=np.stack([yaw for _, yaw, _ in feet], axis=1),
         heel_lift=np.stack([lift for _, _, lift in feet], axis=1),

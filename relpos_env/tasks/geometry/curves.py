@@ -86,8 +86,8 @@ class Curve:
 
 def _arc(trace: F64) -> F64:
     """Return the arc length from the first point to every point, (point) [m]."""
-    legs = np.linalg.norm(np.diff(trace, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(legs)])
+    segments = np.linalg.norm(np.diff(trace, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(segments)])
 
 
 def _eased(trace: F64, closed: bool) -> F64:
@@ -139,14 +139,14 @@ def rounded(corners: F64, closed: bool, radius: float = CORNER_RADIUS) -> F64:
     """
     n = len(corners)
     ends = np.roll(corners, -1, axis=0) - corners
-    legs = ends if closed else ends[:-1]
-    lengths = np.linalg.norm(legs, axis=1)
+    segments = ends if closed else ends[:-1]
+    lengths = np.linalg.norm(segments, axis=1)
     if lengths.min() < 0.05:
         raise EnvError("path: expected points at least 0.05 m apart")
-    trace = [corners[0]] if not closed else [corners[0] + 0.5 * legs[0]]
+    trace = [corners[0]] if not closed else [corners[0] + 0.5 * segments[0]]
     inner = [*range(1, n), 0] if closed else list(range(1, n - 1))
     for k in inner:
-        before, after = legs[k - 1] / lengths[k - 1], legs[k] / lengths[k]
+        before, after = segments[k - 1] / lengths[k - 1], segments[k] / lengths[k]
         turn = np.arctan2(before[0] * after[1] - before[1] * after[0], before @ after)
         if abs(turn) > np.radians(170.0):
             raise EnvError(f"path: turns back on itself at point {k}, expected at most 170 degrees")

@@ -68,8 +68,8 @@ def frame_now(env, t, frame, curve, motion, out):
 
 @kernel
 def update_frame(
-    start, stop, pos, vel, accel, clear, present, t, collided, seated, frame, places, curve, motion,
-    limits, target, plan, goal, error, rewards, done,
+    start, stop, pos, vel, accel, clear, present, t, collided, assigned, frame, places, curve,
+    motion, limits, target, plan, goal, error, rewards, done,
 ):  # fmt: skip
     """Write goals, plan, error, rewards and end of the environments from start to stop.
 
@@ -83,7 +83,7 @@ def update_frame(
         present: True where the car is present, (env, car).
         t: Time since the start of the episode, (env) [s].
         collided: Number of contacts begun in the step, (env, car).
-        seated: True where a slot is assigned, (env, car).
+        assigned: True where a slot is assigned, (env, car).
         frame: As in `frame_state`.
         places: Slot x, y in the frame [m], and 1 for a car that receives the plan, else 0,
             (env, car, 3).
@@ -105,7 +105,7 @@ def update_frame(
     ends = motion[2] > 0.0 and motion[3] == 0.0
     n_changed = 0
     for env in range(start, stop):
-        if changed(env, present, seated):
+        if changed(env, present, assigned):
             n_changed += 1
             continue
         x, y, c, s, _, _, _ = frame_state(env, t[env], frame, curve, motion)

@@ -24,8 +24,8 @@ PROGRESS_SCALE = 1.0
 
 @kernel
 def update_gap(
-    start, stop, pos, accel, clear, present, t, collided, seated, route, lag, limits, target, plan,
-    goal, error, rewards, done,
+    start, stop, pos, accel, clear, present, t, collided, assigned, route, lag, limits, target,
+    plan, goal, error, rewards, done,
 ):  # fmt: skip
     """Write goals, plan, error, rewards and end of the environments from start to stop.
 
@@ -38,7 +38,7 @@ def update_gap(
         present: True where the car is present, (env, car).
         t: Time since the start of the episode, (env) [s].
         collided: Number of contacts begun in the step, (env, car).
-        seated: True where the car has a route, (env, car).
+        assigned: True where the car has a route, (env, car).
         route: x, y and arc length from the start, (env, car, point, 3) [m]; shorter routes
             repeat their last point.
         lag: Arc length by which a car starts late, (env, car) [m].
@@ -57,7 +57,7 @@ def update_gap(
     last = route.shape[2] - 1
     n_changed = 0
     for env in range(start, stop):
-        if changed(env, present, seated):
+        if changed(env, present, assigned):
             n_changed += 1
             continue
         arrived = True
@@ -74,15 +74,15 @@ def update_gap(
             goal[env, k, 1] = route[env, k, point, 1]
             if point < last:
                 arrived = False
-                leg = route[env, k, point + 1, 2] - route[env, k, point, 2]
-                if s >= 0.0 and leg > 0.0:
-                    along = (s - route[env, k, point, 2]) / leg
+                segment = route[env, k, point + 1, 2] - route[env, k, point, 2]
+                if s >= 0.0 and segment > 0.0:
+                    along = (s - route[env, k, point, 2]) / segment
                     d_x = route[env, k, point + 1, 0] - route[env, k, point, 0]
                     d_y = route[env, k, point + 1, 1] - route[env, k, point, 1]
                     goal[env, k, 0] += along * d_x
                     goal[env, k, 1] += along * d_y
-                    plan[env, k, 0] = speed * d_x / leg
-                    plan[env, k, 1] = speed * d_y / leg
+                    plan[env, k, 0] = speed * d_x / segment
+                    plan[env, k, 1] = speed * d_y / segment
             off = math.hypot(pos[env, k, 0] - goal[env, k, 0], pos[env, k, 1] - goal[env, k, 1])
             rewards[env, k, 1] = math.exp(-off / PROGRESS_SCALE)
         targets_from_goals(env, present, goal, target)

@@ -151,6 +151,6 @@ def ways_to(x, y, boxes, n, corner, between, onward):
         onward[i] = math.inf
     for j in range(n):
         if not crosses(corner[j, 0], corner[j, 1], x, y, boxes):
-            leg = math.hypot(x - corner[j, 0], y - corner[j, 1])
+            segment = math.hypot(x - corner[j, 0], y - corner[j, 1])
             for i in range(n):
-                onward[i] = min(onward[i], between[i, j] + leg)
+                onward[i] = min(onward[i], between[i, j] + segment)

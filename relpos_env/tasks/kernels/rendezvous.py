@@ -13,7 +13,7 @@ CLOSING_SPEED = 1.0
 
 @kernel
 def update_meeting(
-    start, stop, pos, vel, accel, clear, present, t, collided, seated, place, since, limits, goal,
+    start, stop, pos, vel, accel, clear, present, t, collided, assigned, place, since, limits, goal,
     error, rewards, done,
 ):  # fmt: skip
     """Write goals, error, rewards and end of the environments from start to stop.
@@ -30,7 +30,7 @@ def update_meeting(
         present: True where the car is present, (env, car).
         t: Time since the start of the episode, (env) [s].
         collided: Number of contacts begun in the step, (env, car).
-        seated: Cars present at the last assignment, (env, car).
+        assigned: Cars present at the last assignment, (env, car).
         place: Meeting point, (env, 2) [m].
         since: Time since which all are within the radius, else infinite, (env) [s], updated.
         limits: Radius [m], time to stay [s], scale of the error [m].
@@ -46,7 +46,7 @@ def update_meeting(
     n = present.shape[1]
     n_changed = 0
     for env in range(start, stop):
-        if changed(env, present, seated):
+        if changed(env, present, assigned):
             n_changed += 1
             continue
         x, y, v_x, v_y, n_present = 0.0, 0.0, 0.0, 0.0, 0

@@ -21,7 +21,7 @@ from tracking.kernels.jit import kernel
 
 @kernel
 def update_ring(
-    start, stop, pos, vel, accel, clear, present, t, collided, seated, arc, curve, motion, target,
+    start, stop, pos, vel, accel, clear, present, t, collided, assigned, arc, curve, motion, target,
     plan, goal, error, rewards,
 ):  # fmt: skip
     """Write goals, plan, error and rewards of the environments from start to stop.
@@ -36,7 +36,7 @@ def update_ring(
         present: True where the car is present, (env, car).
         t: Time since the start of the episode, (env) [s].
         collided: Number of contacts begun in the step, (env, car).
-        seated: True where a slot is assigned, (env, car).
+        assigned: True where a slot is assigned, (env, car).
         arc: Arc length of each car's slot at t = 0, (env, car) [m].
         curve: Coefficients of x and y, falling powers, (segment, 2, 4).
         motion: Length of the curve [m], speed [m/s], lookahead of the plan [s], scale of the
@@ -53,7 +53,7 @@ def update_ring(
     length, speed, lookahead, error_scale = motion
     n_changed = 0
     for env in range(start, stop):
-        if changed(env, present, seated):
+        if changed(env, present, assigned):
             n_changed += 1
             continue
         for k in range(present.shape[1]):

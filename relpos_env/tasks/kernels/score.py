@@ -20,11 +20,11 @@ VELOCITY_SCALE = 0.5
 
 
 @small_kernel
-def changed(env, present, seated):
+def changed(env, present, assigned):
     """True if the set of present cars differs from the set that slots were assigned to."""
     n_other = 0
     for k in range(present.shape[1]):
-        n_other += present[env, k] != seated[env, k]
+        n_other += present[env, k] != assigned[env, k]
     return n_other > 0
 
 

@@ -176,7 +176,7 @@ def decode(data: bytes) -> Frame:
     )
     ids = [e.id for e in entries]
     if len(set(ids)) < len(ids) or src in ids:
-        raise WireError("table: an ID stands twice")
+        raise WireError("table: a duplicate ID")
     stamp = int.from_bytes(data[16:21], "little")
     return Frame(
         Type(kind & 15), src, root, round_, slot, n, boot, stamp, entries, pan, sequence,

@@ -145,8 +145,8 @@ def initialise_node(c, s, h, i, t):
     still = is_at_rest(c, node, t)
     # The heading error of the place where it was switched on counts less as it drives.
     drove = max(node.t_moved - node.t_first - c.orienting, 0.0)
-    stood = decay(drove / node.heading_tau)
-    heading_var = node.heading_var + stood * (node.first_heading_var - node.heading_var)
+    remaining = decay(drove / node.heading_tau)
+    heading_var = node.heading_var + remaining * (node.first_heading_var - node.heading_var)
     for k in range(c.d):
         speed_var = c.rest_var if still else c.start_speed_var
         reset_state(s, h, c.n, node.i_vel + k, speed_var)

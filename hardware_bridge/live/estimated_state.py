@@ -14,7 +14,7 @@ from relpos_env.interface.views import AgentView
 from tracking.arrays import F64, Bool
 
 
-class Believed:
+class EstimatedState:
     """State of the world for tasks, arrays over (1, slot, ...); world frame."""
 
     def __init__(self, n_cars: int) -> None:

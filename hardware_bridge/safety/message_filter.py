@@ -9,7 +9,7 @@ from hardware_bridge.identity import Identities, Mark, Verdict
 from hardware_bridge.readings import UNNAMED, Reading, Source
 
 
-class Believed:
+class MessageFilter:
     """Message filter of one car's port."""
 
     def __init__(self, car: CarConfig, marks: Mapping[int, Mark]) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hardware_bridge.live.believed import Believed
+from hardware_bridge.live.estimated_state import EstimatedState
 from relpos_env.interface.views import make_view
 
 DT, RADIUS, RATE = 0.1, 1.5, 0.8
@@ -25,45 +25,45 @@ def seen_at(view, t, ok):
 
 @pytest.mark.parametrize("lost", range(3))
 def test_a_car_of_which_nobody_is_sure_goes_on_by_its_odometer(lost):
-    believed, view = Believed(3), make_view(1, 3)
+    estimated, view = EstimatedState(3), make_view(1, 3)
     doubtful = np.arange(3) != lost
     for k in range(60):
         sure = not 20 <= k < 40
         true = seen_at(view, k * DT, np.ones(3, dtype=bool) if sure else doubtful)
-        believed.update(view, DT)
-        assert believed.complete == sure
-        np.testing.assert_allclose(believed.pos_w[0], true, atol=1e-12 if sure else 0.02)
-        np.testing.assert_allclose(np.hypot(*believed.vel_w[0].T), RADIUS * RATE)
+        estimated.update(view, DT)
+        assert estimated.complete == sure
+        np.testing.assert_allclose(estimated.pos_w[0], true, atol=1e-12 if sure else 0.02)
+        np.testing.assert_allclose(np.hypot(*estimated.vel_w[0].T), RADIUS * RATE)
 
 
 def test_a_car_that_was_never_seen_has_no_place():
-    believed, view = Believed(3), make_view(1, 3)
+    estimated, view = EstimatedState(3), make_view(1, 3)
     for k in range(5):
         seen_at(view, k * DT, np.array([True, True, False]))
-        believed.update(view, DT)
-        assert not believed.complete
-        assert believed.known[0].tolist() == [True, True, False]
-        np.testing.assert_array_equal(believed.pos_w[0, 2], 0.0)
-        np.testing.assert_allclose(believed.pos_w[0, :2].sum(axis=0), 0.0, atol=1e-12)
+        estimated.update(view, DT)
+        assert not estimated.complete
+        assert estimated.known[0].tolist() == [True, True, False]
+        np.testing.assert_array_equal(estimated.pos_w[0, 2], 0.0)
+        np.testing.assert_allclose(estimated.pos_w[0, :2].sum(axis=0), 0.0, atol=1e-12)
 
 
 def test_a_car_that_left_and_came_back_has_none_until_it_is_seen():
-    believed, view = Believed(3), make_view(1, 3)
+    estimated, view = EstimatedState(3), make_view(1, 3)
     seen_at(view, 0.0, np.ones(3, dtype=bool))
-    believed.update(view, DT)
+    estimated.update(view, DT)
     seen_at(view, DT, np.array([True, True, False]))
     view.present[0, 2] = False
-    believed.update(view, DT)
-    assert believed.present[0].tolist() == [True, True, False]
-    assert believed.complete
+    estimated.update(view, DT)
+    assert estimated.present[0].tolist() == [True, True, False]
+    assert estimated.complete
     seen_at(view, 2 * DT, np.array([True, True, False]))
-    believed.update(view, DT)
-    np.testing.assert_array_equal(believed.pos_w[0, 2], 0.0)
-    assert not believed.complete
+    estimated.update(view, DT)
+    np.testing.assert_array_equal(estimated.pos_w[0, 2], 0.0)
+    assert not estimated.complete
 
 
 def test_a_place_that_goes_on_outlasts_who_comes_back():
-    believed, view = Believed(4), make_view(1, 4)
+    estimated, view = EstimatedState(4), make_view(1, 4)
     of_three = np.array([True, True, True, False])
     for k in range(40):
         # Car 3 is never tracked again; then car 0 is away for a while.
@@ -71,8 +71,8 @@ def test_a_place_that_goes_on_outlasts_who_comes_back():
         ok[0] = not 15 <= k < 20
         true = seen_at(view, k * DT, ok)
         view.present[0, 0] = ok[0]
-        believed.update(view, DT)
+        estimated.update(view, DT)
         here = view.present[0]
         np.testing.assert_allclose(
-            believed.pos_w[0, here], true[here] - true[here].mean(axis=0), atol=0.02
+            estimated.pos_w[0, here], true[here] - true[here].mean(axis=0), atol=0.02
         )
