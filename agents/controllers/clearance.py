@@ -70,7 +70,7 @@ class ClearanceParams:
     """[m/s] Minimum requested speed at which the direction of travel may be reversed."""
 
 
-def standing_bounds(around: Surroundings, params: ClearanceParams) -> Bounds:
+def clearance_bounds(around: Surroundings, params: ClearanceParams) -> Bounds:
     """Return the largest velocity towards the nearest points of obstacles; infinite for others."""
     distance, toward = around.to_body
     before, behind = np.roll(distance, 1, axis=-1), np.roll(distance, -1, axis=-1)

@@ -11,7 +11,7 @@ import numpy as np
 from agents.controllers.avoidance import AvoidanceParams, bounded_speed, closing_bounds, pushed_back
 from agents.controllers.base import Plane, Reader, Sight, shortened
 from agents.controllers.bounds import joined
-from agents.controllers.clearance import clear_arc, standing_bounds
+from agents.controllers.clearance import clear_arc, clearance_bounds
 from agents.controllers.search import search
 from agents.controllers.steering import SteeringParams, drive
 from agents.controllers.surroundings import surroundings
@@ -92,7 +92,7 @@ def corrected(
     bounds, around = closing_bounds(sight, avoidance), surroundings(sight)
     pushing = bounds
     if around is not None:
-        pushing = joined(bounds, standing_bounds(around, avoidance.clearance))
+        pushing = joined(bounds, clearance_bounds(around, avoidance.clearance))
     desired = pushed_back((sight.command[0] + x, sight.command[1] + y), pushing, avoidance)
     actions = search(sight, drive(sight, desired, bounds, steering, avoidance))
     if around is not None:

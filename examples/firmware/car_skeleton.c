@@ -57,8 +57,8 @@ static void stop(void) {
 /* Whether a command was never seen before: what was recorded must move nothing again. */
 static int is_new(uint32_t its_boot, uint32_t its_sequence) {
     if (has_host && its_boot == host_boot) return its_sequence > host_sequence;
-    /* With a key only later starts of the host count. A car that starts anew in the middle of a
-       drive stands until the host is started anew, too. */
+    /* With a key only later starts of the host count. A car that restarts in the middle of a
+       drive remains stopped until the host is restarted, too. */
     if (key && its_boot <= least_boot) return 0;
     return 1;
 }

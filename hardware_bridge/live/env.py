@@ -64,7 +64,7 @@ class HardwareFormationEnv(BaseFormationParallelEnv):
     def close(self) -> None:
         """Stop the cars; the environment can be reset again."""
         if self._begun:
-            self.group.let_stand()
+            self.group.stop_cars()
         self.agents = []
         self._begun = False
 

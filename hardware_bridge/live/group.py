@@ -108,7 +108,7 @@ class LiveGroup:
         self.observations[:] = 0.0
         if self.t_ns:
             # The last request becomes outdated meanwhile, so waiting cars are stopped.
-            self.let_stand()
+            self.stop_cars()
         self._look(first=True)
 
     def step(self, speed: F64, steering: F64) -> None:
@@ -146,7 +146,7 @@ class LiveGroup:
         }
         return columns
 
-    def let_stand(self) -> None:
+    def stop_cars(self) -> None:
         """Request no motion, without waiting."""
         fence, n = self.swarm.config.safety.fence, self.swarm.config.n_slots
         still = np.zeros(n)

@@ -14,7 +14,7 @@ from agents.controllers.clearance import (
     ClearanceParams,
     clear_arc,
     clear_way,
-    standing_bounds,
+    clearance_bounds,
 )
 from agents.controllers.surroundings import (
     HALF_LENGTH,
@@ -112,13 +112,13 @@ def test_a_clear_way_on_an_arc():
 
 def test_few_beams_keep_farther_off():
     """They miss obstacles between their directions."""
-    near = {n: standing_bounds(surroundings(see(wall(0.0, 0.5, n))), PARAMS) for n in (8, 16)}
+    near = {n: clearance_bounds(surroundings(see(wall(0.0, 0.5, n))), PARAMS) for n in (8, 16)}
     assert near[8].closing.min() < near[16].closing.min() - 0.03
     assert near[16].closing.min() == pytest.approx(2.0 * (0.29 - PARAMS.keep), abs=0.02)
 
 
 def test_velocities_are_pushed_back_from_the_nearest_point_alone():
-    bounds = standing_bounds(surroundings(see(wall(0.5 * np.pi, 0.3, 16))), PARAMS)
+    bounds = clearance_bounds(surroundings(see(wall(0.5 * np.pi, 0.3, 16))), PARAMS)
     assert (bounds.closing < 10.0).sum() <= 2
     k = bounds.closing.argmin()
     assert bounds.closing[k] == pytest.approx(PARAMS.rate * (0.2 - PARAMS.keep), abs=0.02)

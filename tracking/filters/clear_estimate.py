@@ -6,7 +6,7 @@ from tracking.kernels.jit import small_kernel
 
 
 @small_kernel
-def is_heard(c, node, t):
+def has_recent_range(c, node, t):
     """True if the last range of a node is no older than `node_timeout`; otherwise it has left."""
     return node.seen and t - node.t_last_range <= c.node_timeout
 

@@ -127,7 +127,7 @@ def emulate(
     )
     click.echo(
         "frames: said by the devices; lost, damaged: on the way, as --faults asks; dropped: "
-        "no room;\nunheard: bytes while nothing had the port open; read: bytes of commands"
+        "no room;\nunread: bytes while nothing had the port open; read: bytes of commands"
     )
     late = result.lateness
     error = result.summary["formation_error"]

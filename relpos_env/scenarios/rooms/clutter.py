@@ -46,7 +46,7 @@ def draw_clutter(
         for x, y in rng.uniform(-half, half, (TRIES, 2)):
             box = Obstacle(x=x, y=y, width=width, height=height, angle=angle, movable=movable)
             row = boxes_of((box,))
-            if _stands_well(scenario, tuple(placed), row) and _leaves_ways(
+            if _is_valid_place(scenario, tuple(placed), row) and _leaves_ways(
                 scenario, floor, n_slots, row[0]
             ):
                 floor.add(row[0])
@@ -55,7 +55,7 @@ def draw_clutter(
     return tuple(placed)
 
 
-def _stands_well(scenario: Scenario, placed: tuple[Obstacle, ...], row: F64) -> bool:
+def _is_valid_place(scenario: Scenario, placed: tuple[Obstacle, ...], row: F64) -> bool:
     """Return whether a box is in the room and clear of obstacles, initial poses and the gap."""
     others = boxes_of(scenario.obstacles + placed)
     if beyond_walls(row, scenario.room)[0] or overlap(row, others).any():

@@ -86,9 +86,9 @@ def all_within(env, pos, present, goal, tolerance):
 
 
 @small_kernel
-def velocity_term(env, k, vel, wanted_x, wanted_y, rewards):
+def velocity_term(env, k, vel, reference_x, reference_y, rewards):
     """Write the second reward term of a car with a reference velocity [m/s]."""
-    off = math.hypot(vel[env, k, 0] - wanted_x, vel[env, k, 1] - wanted_y)
+    off = math.hypot(vel[env, k, 0] - reference_x, vel[env, k, 1] - reference_y)
     rewards[env, k, 1] = math.exp(-off / VELOCITY_SCALE)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracking.filters.clear_estimate import clear_estimate, is_heard
+from tracking.filters.clear_estimate import clear_estimate, has_recent_range
 from tracking.filters.joint.ekf.columns import N_PRE
 from tracking.filters.joint.ekf.preintegration import preintegrate
 from tracking.filters.joint.ekf.propagation import predict
@@ -37,7 +37,7 @@ def write_estimate(c, s, work, t, e, o, out):
         node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
         nis[e, o, p] = pair.nis
         if not (node_i.present and node_j.present):
-            both = is_heard(c, node_i, t) and is_heard(c, node_j, t)
+            both = has_recent_range(c, node_i, t) and has_recent_range(c, node_j, t)
             status[e, o, p] = STARTING if both else ABSENT
             continue
         nlos[e, o, p] = s.nlos[h, p]

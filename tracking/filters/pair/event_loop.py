@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracking.filters.clear_estimate import clear_estimate, is_heard
+from tracking.filters.clear_estimate import clear_estimate, has_recent_range
 from tracking.filters.first_ranges import collect
 from tracking.filters.level_vehicle import direction, level
 from tracking.filters.pair.bank import (
@@ -234,7 +234,7 @@ def write_estimate(c, s, t, e, o, out):
         node_i, node_j = s.nodes[pair.i], s.nodes[pair.j]
         nis[e, o, p] = pair.nis
         if not (node_i.present and node_j.present):
-            both = is_heard(c, node_i, t) and is_heard(c, node_j, t)
+            both = has_recent_range(c, node_i, t) and has_recent_range(c, node_j, t)
             status[e, o, p] = STARTING if both else ABSENT
             continue
         x[0, 0] = s.x[p, h, :6]

@@ -79,7 +79,7 @@ def spawn_rotation_hypotheses(c, s, layout, work):
     opens = has_linear_alignment(c, s)
     set_alignment(group, LINEAR if opens else FILTERED)
     group.undecided = not opens
-    if group.t > group.t_scoring_starts - c.wheels_after + c.stood_for + TIE:
+    if group.t > group.t_scoring_starts - c.wheels_after + c.rest_time + TIE:
         group.t_scoring_starts = group.t
     was_alive = s.alive.copy()
     for h in range(s.alive.shape[0]):

@@ -87,7 +87,7 @@ class AlignmentParams:
     wheels_after: float = 4.0
     """[s] Time after a start on wheels in which likelihoods do not count, as velocities are not
     known yet. Larger: later decisions."""
-    stood_for: float = 1.0
+    rest_time: float = 1.0
     """[s] Rest after the start that ends `wheels_after`; larger: a longer rest is needed."""
     degenerate: float = 2.5
     """[-] Least extent of a layout over its error below which it is degenerate; larger: sooner."""
