@@ -129,8 +129,14 @@ def test_a_plan_is_read():
         ("[[faults]]\nt = 'x'\nkind = 'reboot'\ntarget = 'nodes.1'", "faults[0].t: expected a num"),
         ("[[faults]]\nt = -1\nkind = 'reboot'\ntarget = 'nodes.1'", "faults[0].t: expected 0"),
         ("[[faults]]\nt = 1\nkind = 'bang'\ntarget = 'nodes.1'", "faults[0].kind: expected one of"),
-        ("[[faults]]\nt = 1\nkind = 'twin'\ntarget = 'cars.1'", "faults[0].target: twin is for"),
-        ("[[faults]]\nt = 1\nkind = 'twin'\ntarget = 'n1'", "faults[0].target: expected nodes.ID"),
+        (
+            "[[faults]]\nt = 1\nkind = 'duplicate-id'\ntarget = 'cars.1'",
+            "faults[0].target: duplicate-id is for",
+        ),
+        (
+            "[[faults]]\nt = 1\nkind = 'duplicate-id'\ntarget = 'n1'",
+            "faults[0].target: expected nodes.ID",
+        ),
     ],
 )  # fmt: skip
 def test_errors_name_file_and_key(text, told, tmp_path):

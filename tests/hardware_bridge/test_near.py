@@ -69,7 +69,9 @@ def test_policies_with_beams_drive_cars_that_have_them():
         lambda: VirtualBridge(RING), 3, n_rangefinders=8, name="consensus", seconds=3.0
     )
     assert result.decisions == 30
-    with pytest.raises(UsageError, match="hold-beams: expected 16 beams, the cars have 8"):
+    with pytest.raises(
+        UsageError, match="hold-beams: expected 16 distance sensors, the cars have 8"
+    ):
         drive_on(lambda: VirtualBridge(RING), 3, n_rangefinders=8, name="hold-beams", seconds=3.0)
 
 

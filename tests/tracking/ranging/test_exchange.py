@@ -64,7 +64,7 @@ class Line:
         n = len(others) + 1
         frame = Frame(Type.REPLY, node.id, 0, 0, 0, n, node.boot, stamp % MODULUS, rows)
         self.frame = decode(encode(self.edit(frame)))
-        node.listener.spoken(stamp)
+        node.listener.note_sent(stamp)
         for other in self.nodes:
             if other.id != node.id:
                 self.hear(other, node, t)
