@@ -45,9 +45,9 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(run, tmp_path, monkeypatch)
 BAD_CONFIG = [
     ("not json", "damaged"),
     ("[]", "format None"),
-    ('{"format": 8, "config": {}}', "format 8, expected 10"),
-    ('{"format": 10, "config": {}}', "missing field"),
-    ('{"format": 10, "config": {"speed": 1}}', "unknown field 'speed'"),
+    ('{"format": 8, "config": {}}', "format 8, expected 11"),
+    ('{"format": 11, "config": {}}', "missing field"),
+    ('{"format": 11, "config": {"speed": 1}}', "unknown field 'speed'"),
 ]
 
 
