@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from relpos_env.core.tracked_world import default_params
+from relpos_env.core.tracked_world import Trackers, default_params
 from relpos_env.errors import EnvError, UnknownArgument
 from relpos_env.interface.actions import ActionMode, action_mode
 from relpos_env.interface.observations import ModeBuilder, ObservationMode, observation_mode
@@ -70,6 +70,10 @@ class FormationConfig:
     """Action mode: one of `relpos_env.interface.actions.ACTIONS`, or your own."""
     filter: str | FilterBuilder = DEFAULT_FILTER
     """Position filter of the trackers: one of `tracking.filters.FILTERS`, or your own."""
+    trackers: Trackers = "group"
+    """``group``: one tracker receives the raw inertial samples of all cars, like a host that
+    listens; ``own``: every car has its own, which knows what the others send in their ranging
+    messages."""
     params: TrackerParams | None = None
     """Parameters of the tracker; by default `relpos_env.core.tracked_world.default_params`."""
     operator: OperatorSimParams = field(default_factory=OperatorSimParams)
@@ -105,6 +109,8 @@ class FormationConfig:
         )
         if self.physics not in (None, *get_args(Physics)):
             raise EnvError(f"physics: expected pymunk or fast, got {self.physics!r}")
+        if self.trackers not in get_args(Trackers):
+            raise EnvError(f"trackers: expected group or own, got {self.trackers!r}")
         for name, kinds in KINDS.items():
             if not isinstance(getattr(self, name), kinds):
                 expected = " or ".join("None" if k is type(None) else k.__name__ for k in kinds)
@@ -141,7 +147,9 @@ class FormationConfig:
             else look_up({}, self.reward, "reward", group="relpos_env.rewards"),
             mode=observation_mode(self.observation, n_cars, config.proximity),
             actions=action_mode(self.actions),
-            params=default_params(scenario, n_cars) if self.params is None else self.params,
+            params=default_params(scenario, n_cars, self.trackers)
+            if self.params is None
+            else self.params,
         )
 
 

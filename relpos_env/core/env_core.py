@@ -69,6 +69,7 @@ class EnvCore:
             n_envs,
             filter=config.filter,
             params=parts.params,
+            trackers=config.trackers,
             n_steps=round(DECISION / DT),
             proximity=config.proximity,
             physics=physics,

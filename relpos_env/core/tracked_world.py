@@ -8,9 +8,11 @@ Measurements are the only input of the tracker.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Literal
 
 import numpy as np
 
+from relpos_env.interface.own_perception import OwnPerception
 from relpos_env.interface.perception import FOR_POLICIES, Perception
 from relpos_env.interface.views import AgentView
 from relpos_env.scenarios import Scenario
@@ -21,14 +23,26 @@ from tracking.arrays import F64, Bool
 from tracking.estimate import TeamEstimate
 from tracking.filters import FilterBuilder
 from tracking.late_data.horizon import HorizonParams
+from tracking.measurements import MeasurementBlock
+from tracking.ranging.compiled.overheard import Overheard
 from tracking.ranging.frames.airtime import round_rate
 from tracking.tracker import TrackerParams
 
+Trackers = Literal["group", "own"]
+"""``group``: one tracker receives the raw samples of all cars at no cost, as a host that listens;
+``own``: each car has a tracker, which knows of the others what they send in ranging messages."""
 
-def default_params(scenario: Scenario, n_cars: int) -> TrackerParams:
-    """Return the default tracker parameters; their horizon covers 1.5 ranging rounds."""
-    radio = scenario.radio.for_nodes(n_cars)
-    rounds = 1.5 / round_rate(radio.session.phy, n_cars)
+
+def default_params(scenario: Scenario, n_cars: int, trackers: Trackers = "group") -> TrackerParams:
+    """Return the default tracker parameters.
+
+    Their horizon covers 1.5 ranging rounds, or 3.5 with a tracker on each car, which knows the
+    motion of the others one round later, and one more for each lost message.
+    """
+    is_own = trackers == "own"
+    radio = scenario.radio.with_motion() if is_own else scenario.radio
+    phy = radio.for_nodes(n_cars).session.phy
+    rounds = (3.5 if is_own else 1.5) / round_rate(phy, n_cars)
     horizon = HorizonParams(delay=max(HorizonParams().delay, rounds))
     return TrackerParams(filter=FOR_POLICIES, horizon=horizon)
 
@@ -42,7 +56,7 @@ def waiting_at_most(scenario: Scenario, n_cars: int, params: TrackerParams, n_st
 
 
 class TrackedWorld:
-    """Simulated groups of cars with a tracker."""
+    """Simulated groups of cars with a tracker for the group, or one on each car."""
 
     def __init__(
         self,
@@ -52,20 +66,21 @@ class TrackedWorld:
         *,
         filter: str | FilterBuilder,
         params: TrackerParams,
+        trackers: Trackers = "group",
         n_steps: int = 10,
         proximity: int = 0,
         physics: Physics,
     ) -> None:
-        self.swarm = swarm = World(scenario, n_cars, n_envs, n_steps, proximity, physics)
-        self.perception = Perception(
-            swarm.constellation,
-            params,
-            swarm.block,
-            swarm.powered,
-            filter=filter,
-            room=waiting_at_most(scenario, n_cars, params, n_steps),
-            n_rangefinders=proximity,
+        is_own = trackers == "own"
+        self.swarm = swarm = World(
+            scenario, n_cars, n_envs, n_steps, proximity, physics, sends_motion=is_own
         )
+        room = waiting_at_most(scenario, n_cars, params, n_steps)
+        make = OwnPerception if is_own else Perception
+        self.perception = make(
+            swarm.constellation, params, *self._inputs(), filter=filter, room=room,
+            n_rangefinders=proximity,
+        )  # fmt: skip
         self._singles: dict[int, TrackedWorld] = {}
 
     @property
@@ -75,14 +90,17 @@ class TrackedWorld:
 
     @property
     def estimate(self) -> TeamEstimate:
-        """Last estimate of the tracker, as old as the horizon; the next one overwrites it."""
+        """Last estimate of the tracker, as old as the horizon; the next one overwrites it.
+
+        Arrays over (env, ...); of trackers on each car over (env car, ...).
+        """
         return self.perception.estimate
 
     def part(self, envs: slice) -> TrackedWorld:
         """Return a view of some of the groups that shares their memory."""
         part = TrackedWorld.__new__(TrackedWorld)  # a copy would bind all kernels, 2 ms
         part.swarm = self.swarm.part(envs)
-        part.perception = self.perception.part(envs, part.swarm.block, part.swarm.powered)
+        part.perception = self.perception.part(envs, *part._inputs())
         part._singles = {}
         return part
 
@@ -150,10 +168,14 @@ class TrackedWorld:
         view.near[:] = swarm.proximity
         self.perception.step()
 
+    def _inputs(self) -> tuple[MeasurementBlock, Bool, Overheard]:
+        """Return the arrays that the perception reads."""
+        return self.swarm.block, self.swarm.powered, self.swarm.overheard
+
     def __getstate__(self) -> dict[str, object]:
         """Return the state without the parts."""
         return {**self.__dict__, "_singles": {}}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
-        self.perception.rebind(self.swarm.block, self.swarm.powered)
+        self.perception.rebind(*self._inputs())

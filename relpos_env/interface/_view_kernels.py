@@ -13,27 +13,29 @@ RANGE = 5
 
 
 @kernel
-def see_estimate(motion, rest, pair_i, pair_j, powered, turns, view):
+def see_estimate(motion, rest, pair_i, pair_j, powered, turns, n_trackers, view):
     """Write the estimates of the trackers, predicted to `view.now` at constant velocity.
 
     Args:
-        motion: Position, velocity, covariance of every pair, (env, pair, ...), and orientation of
-            every node, (env, node, 4).
-        rest: True where the orientation is known, (env, node); age, NLOS probability and status,
-            (env, pair); and the time of the estimates, (env) [s].
+        motion: Position, velocity, covariance of every pair, (tracker, pair, ...), and orientation
+            of every node, (tracker, node, 4).
+        rest: True where the orientation is known, (tracker, node); age, NLOS probability and
+            status, (tracker, pair); and the time of the estimates, (tracker) [s].
         pair_i: Smaller node index of the pair, (pair).
         pair_j: Larger node index, (pair); nodes with indices above the cars' are skipped.
         powered: True where the car's tracker runs, (env, car).
         turns: Rotation of every car since the estimate, (env, car) [rad].
+        n_trackers: Number of trackers per environment: one, or one per car.
         view: AgentView, written.
     """
     pos, vel, cov, q = motion
     has_q, age, nlos, status, t = rest
-    for e in range(t.shape[0]):
-        dt = view.now[e] - t[e]
+    is_own = n_trackers > 1
+    for e in range(powered.shape[0]):
         for n in range(powered.shape[1]):
-            w, x, y, z = q[e, n, 0], q[e, n, 1], q[e, n, 2], q[e, n, 3]
-            known = has_q[e, n] and powered[e, n]
+            r = e * n_trackers + n if is_own else e
+            w, x, y, z = q[r, n, 0], q[r, n, 1], q[r, n, 2], q[r, n, 3]
+            known = has_q[r, n] and powered[e, n]
             view.oriented[e, n] = known
             yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
             view.heading[e, n] = yaw + turns[e, n] if known else 0.0
@@ -42,17 +44,18 @@ def see_estimate(motion, rest, pair_i, pair_j, powered, turns, view):
             if j >= powered.shape[1]:
                 continue
             for a, b, sign in ((i, j, 1.0), (j, i, -1.0)):
-                on = powered[e, a]
-                view.ok[e, a, b] = on and status[e, p] == OK
-                view.status[e, a, b] = status[e, p] if on else ABSENT
-                view.age[e, a, b] = age[e, p] + dt if on else 0.0
-                view.nlos[e, a, b] = nlos[e, p] if on else 0.0
+                on, r = powered[e, a], e * n_trackers + a if is_own else e
+                dt = view.now[e] - t[r]
+                view.ok[e, a, b] = on and status[r, p] == OK
+                view.status[e, a, b] = status[r, p] if on else ABSENT
+                view.age[e, a, b] = age[r, p] + dt if on else 0.0
+                view.nlos[e, a, b] = nlos[r, p] if on else 0.0
                 for k in range(2):
-                    v = sign * vel[e, p, k] if on else 0.0
+                    v = sign * vel[r, p, k] if on else 0.0
                     view.vel[e, a, b, k] = v
-                    view.pos[e, a, b, k] = sign * pos[e, p, k] + dt * v if on else 0.0
-                    view.cov[e, a, b, k] = carried(cov, e, p, k, k, dt) if on else 0.0
-                view.cov[e, a, b, 2] = carried(cov, e, p, 0, 1, dt) if on else 0.0
+                    view.pos[e, a, b, k] = sign * pos[r, p, k] + dt * v if on else 0.0
+                    view.cov[e, a, b, k] = carried(cov, r, p, k, k, dt) if on else 0.0
+                view.cov[e, a, b, 2] = carried(cov, r, p, 0, 1, dt) if on else 0.0
 
 
 @small_kernel

@@ -43,6 +43,7 @@ class Perception:
         params: TrackerParams,
         block: MeasurementBlock,
         powered: Bool,
+        overheard: object = None,
         *,
         filter: str | FilterBuilder,
         room: int,
@@ -55,6 +56,7 @@ class Perception:
             params: Parameters of the trackers.
             block: Measurements, updated in place by the caller before every step.
             powered: True where the car's tracker runs, (env, car), updated in place as well.
+            overheard: Not used; see `OwnPerception`.
             filter: One of `tracking.filters.FILTERS`.
             room: Capacity of the horizon in measurements.
             n_rangefinders: Number of distance sensors per car.
@@ -70,13 +72,16 @@ class Perception:
         self._room = room
         self.rebind(block, powered)
 
-    def part(self, envs: slice, block: MeasurementBlock, powered: Bool) -> Perception:
+    def part(
+        self, envs: slice, block: MeasurementBlock, powered: Bool, overheard: object = None
+    ) -> Perception:
         """Return the part for some environments; it shares memory with the whole.
 
         Args:
             envs: Environments.
             block: As in the constructor, of these environments.
             powered: As in the constructor, of these environments.
+            overheard: Not used.
         """
         part = copy.copy(self)
         part.tracker, part.horizon = self.tracker.part(envs), self.horizon.part(envs)
@@ -129,13 +134,8 @@ class Perception:
         self._see()
         self._note()
 
-    def rebind(self, block: MeasurementBlock, powered: Bool) -> None:
-        """Bind the kernels to their arrays.
-
-        Args:
-            block: As in the constructor.
-            powered: As in the constructor.
-        """
+    def rebind(self, block: MeasurementBlock, powered: Bool, overheard: object = None) -> None:
+        """Bind the kernels to their arrays; arguments as in the constructor."""
         self._block, self._powered = block, powered
         view = self.view
         due = MeasurementBlock.empty(len(view.now), self._room)

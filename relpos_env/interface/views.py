@@ -102,7 +102,8 @@ def bind_view(
 
     Args:
         view: Written at every call: relative quantities except ranges and targets, and headings.
-        estimate: Estimates of the same environments, updated before every call.
+        estimate: Estimates of the same environments, or of every car's own tracker, (env car);
+            updated before every call.
         powered: True where the car's tracker runs, (env, car).
         turns: Rotation of every car since the estimate, by its gyroscope, (env, car) [rad].
     """
@@ -110,7 +111,8 @@ def bind_view(
     e = estimate
     motion = (e.pos_ij_w, e.vel_ij_w, e.cov, e.q_wb)
     rest = (e.has_orientation, e.age, e.nlos_prob, e.status, e.t)
-    return bind(see_estimate, motion, rest, i, j, powered, turns, view)
+    n_trackers = max(len(e.t) // len(powered), 1)
+    return bind(see_estimate, motion, rest, i, j, powered, turns, n_trackers, view)
 
 
 def reveal(view: AgentView, pos_w: F64, vel_w: F64, heading: F64) -> None:

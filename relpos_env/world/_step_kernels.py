@@ -75,7 +75,7 @@ def run_steps(
         bodies: Bodies, updated.
         solver: Solver, updated.
         sensors: Sensors, updated.
-        radio: SessionNumbers, RadioNumbers, Air and RangeBuffer; updated.
+        radio: SessionNumbers, RadioNumbers, Air, RangeBuffer and Overheard; updated.
         members: Membership state of each node, (env, node, 2), see `note_members`.
         scenes: Scene of all environments.
         n_steps: Steps of a control period.
@@ -182,8 +182,8 @@ def sense(bodies, sensors, radio, members, scenes, dt, events, e):
         )  # fmt: skip
         write_own(events, e, k + 1, t, IMU, n)
         k += 2
-    numbers, radio_numbers, air, ranges = radio
-    run_env_window(numbers, radio_numbers, air, scenes, dt, ranges, e)
+    numbers, radio_numbers, air, ranges, overheard = radio
+    run_env_window(numbers, radio_numbers, air, scenes, dt, ranges, overheard, e)
     for r in range(ranges.used[e]):
         if k >= events.t.shape[1]:
             break

@@ -33,6 +33,7 @@ from relpos_env.world.world_state import WorldState
 from tracking.arrays import F64, Bool
 from tracking.kernels.jit import bind
 from tracking.measurements import MeasurementBlock
+from tracking.ranging.compiled.overheard import Overheard
 from tracking.records import as_records
 
 Physics = Literal["pymunk", "fast"]
@@ -55,6 +56,7 @@ class World:
         n_steps: int = 10,
         proximity: int = 0,
         physics: Physics = "pymunk",
+        sends_motion: bool = False,
     ) -> None:
         """Allocate the batch; `begin` starts its episodes.
 
@@ -66,6 +68,7 @@ class World:
             proximity: Number of distance sensors of each car.
             physics: `pymunk`: the cars move in a space that is kept, see `world`. `fast`: the space
                 is used only for contacts; the motion without contacts is equal, bit for bit.
+            sends_motion: True if ranging messages carry preintegrated motion (`overheard`).
         """
         self.scenario, self.n_steps = scenario, n_steps
         self.constellation = car_constellation(scenario, n_cars)
@@ -79,7 +82,9 @@ class World:
         self.proximity: F64 = np.zeros((e, n, proximity))
         """Last readings of the distance sensors, (env, car, sensor) [m]; 0 for absent cars."""
         self._clearance: F64 = np.zeros((e, n))
-        self._radio = Radio(scenario.radio.for_nodes(n), n, [0] * e, DT)
+        radio = scenario.radio.with_motion() if sends_motion else scenario.radio
+        self._sends_motion, overheard = sends_motion, n_steps if sends_motion else 0
+        self._radio = Radio(radio.for_nodes(n), n, [0] * e, DT, overheard_windows=overheard)
         self._scene = Scene(
             np.zeros((e, n, 3)), np.zeros((e, n, 3)), self._bodies.boxes, np.zeros((e, 0, 7))
         )
@@ -113,6 +118,11 @@ class World:
     def contacts(self) -> F64:
         """Contacts that each car began in the last step, (env, car)."""
         return self._bodies.contacts
+
+    @property
+    def overheard(self) -> Overheard:
+        """What every car knows from its radio since the reader emptied it; shares memory."""
+        return self._radio.overheard
 
     @property
     def solver_moves(self) -> int:
@@ -168,6 +178,7 @@ class World:
         group.obstacles, group.car, group.size = episode.obstacles, episode.car, self.scenario.room
         group.begin(b, self._solver, env)
         self._radio.reset(env, int(rng.integers(1 << 62)), episode.radio)
+        self.overheard.used[env] = 0
         self._members[env] = 0.0
         group.boots = rng.spawn(1)[0]
         for n in np.nonzero(episode.present)[0].tolist():

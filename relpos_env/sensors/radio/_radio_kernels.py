@@ -14,6 +14,7 @@ from relpos_env.sensors.radio._path_kernels import (
     true_time,
 )
 from tracking.kernels.jit import kernel, small_kernel
+from tracking.ranging.compiled.overheard import note_message, note_resolved
 from tracking.ranging.compiled.session import (
     may_insert,
     switch_on,
@@ -93,7 +94,7 @@ class Scene(NamedTuple):
 
 
 @kernel
-def run_window(p, radio, batch, scenes, dt, out):
+def run_window(p, radio, batch, scenes, dt, out, over):
     """Simulate the messages of all environments for one window.
 
     Args:
@@ -103,13 +104,14 @@ def run_window(p, radio, batch, scenes, dt, out):
         scenes: Scene of all environments.
         dt: Length of the window [s].
         out: RangeBuffer, written; it must hold the largest number of ranges of a window.
+        over: Overheard, appended.
     """
     for e in range(batch.seeds.shape[0]):
-        run_env_window(p, radio, batch, scenes, dt, out, e)
+        run_env_window(p, radio, batch, scenes, dt, out, over, e)
 
 
 @kernel
-def run_env_window(p, radio, batch, scenes, dt, out, e):
+def run_env_window(p, radio, batch, scenes, dt, out, over, e):
     """Simulate the messages of environment e for one window; arguments as for `run_window`."""
     air = OneAir(
         batch.nodes[e],
@@ -124,7 +126,7 @@ def run_env_window(p, radio, batch, scenes, dt, out, e):
     )
     scene = Scene(scenes.pos0[e], scenes.pos1[e], scenes.boxes[e], scenes.capsules[e])
     seed, c = batch.seeds[e], batch.channel[e]
-    n = air.nodes.shape[0]
+    n, start = air.nodes.shape[0], batch.window[e] * dt
     out.used[e] = 0
     for k in range(n):
         air.nodes[k].step = distance_moved(scene, k)
@@ -141,7 +143,7 @@ def run_env_window(p, radio, batch, scenes, dt, out, e):
             take_timeout(p, air.sessions[k], air.peers, k, air.messages[k], air.rows)
             launch(radio, air, k)
         else:
-            end_message(p, radio, c, seed, air, scene, k, t, dt, out, e)
+            end_message(p, radio, c, seed, air, scene, k, t, dt, out, over, start, e)
     close_window(radio, air, seed, batch.window[e], dt)
     batch.window[e] += 1
 
@@ -238,9 +240,9 @@ def detect(p, radio, c, seed, air, scene, s, r, t, dt):
 
 
 @small_kernel
-def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
+def end_message(p, radio, c, seed, air, scene, s, t, dt, out, over, start, e):
     """End a message: deliver it to the radios locked on it and free these for other ones."""
-    n = air.nodes.shape[0]
+    n, overhears = air.nodes.shape[0], over.t.shape[1] > 0
     air.flights[s].active, air.flights[s].end = False, np.inf
     air.nodes[s].sent += 1
     free = 1 << s
@@ -259,6 +261,14 @@ def end_message(p, radio, c, seed, air, scene, s, t, dt, out, e):
             )
             if distance > 0.0:
                 note_range(air, r, s, distance, time, rx, out, e)
+            if overhears and session.received_at == session.now:
+                note_message(over, e, r, s, air.nodes[s].sent, start + air.flights[s].moment)
+                if distance > 0.0:
+                    at = start + true_time(air.nodes[r], time)
+                    note_resolved(
+                        over, e, r, s, air.nodes[r].sent, air.nodes[s].sent, at, distance,
+                        rx.rx_power, rx.fp_power,
+                    )  # fmt: skip
             if newcomer and may_insert(p, session):
                 at = rx.stamp + air.messages[s].ticks + p.turnaround
                 transmit(p, session, air.peers, r, air.messages[r], air.rows, at)

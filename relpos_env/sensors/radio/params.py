@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from relpos_env.sensors.radio.channel import CALIBRATED, ChannelParams
-from tracking.ranging.frames.wire import entries_per_frame
+from tracking.ranging.frames.motion import MOTION_BYTES
 from tracking.ranging.params import SessionParams
 
 
@@ -28,9 +28,14 @@ class RadioSimParams:
     antenna_height: float = 0.12
     """[m] Height of the antenna over the tracker; the same on every car."""
 
+    def with_motion(self) -> RadioSimParams:
+        """Return these parameters, with preintegrated motion in the messages."""
+        phy = replace(self.session.phy, motion_bytes=MOTION_BYTES)
+        return replace(self, session=replace(self.session, phy=phy))
+
     def for_nodes(self, n_nodes: int) -> RadioSimParams:
         """Return these parameters, with long radio frames if the table of `n_nodes` needs them."""
         phy = self.session.phy
-        if n_nodes - 1 <= entries_per_frame(phy.max_frame):
+        if n_nodes - 1 <= phy.room:
             return self
         return replace(self, session=replace(self.session, phy=replace(phy, max_frame=1023)))

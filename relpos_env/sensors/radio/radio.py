@@ -29,15 +29,15 @@ from relpos_env.sensors.radio._radio_kernels import Air, Scene, power_nodes, run
 from relpos_env.sensors.radio.params import RadioSimParams
 from tracking.arrays import F64, I64, Bool
 from tracking.params.short_repr import short_repr
+from tracking.ranging.compiled.overheard import Overheard, make_overheard
 from tracking.ranging.compiled.state import (
     MESSAGE,
     SessionNumbers,
     make_sessions,
     session_numbers,
 )
-from tracking.ranging.frames.airtime import airtime, round_rate
+from tracking.ranging.frames.airtime import airtime, round_rate, table_bytes
 from tracking.ranging.frames.timestamps import TICK_HZ
-from tracking.ranging.frames.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 from tracking.ranging.members import MAX_MEMBERS
 
 
@@ -74,6 +74,7 @@ class Radio:
         seeds: list[int],
         dt: float,
         clocks: F64 | None = None,
+        overheard_windows: int = 0,
     ) -> None:
         """Allocate the state with every node switched off.
 
@@ -83,12 +84,13 @@ class Radio:
             seeds: One for each environment, 0 to 2^63.
             dt: Length of a window [s].
             clocks: Relative rate offset of each node's clock, (node) [1]; drawn if None.
+            overheard_windows: Number of windows for which `overheard` has room.
 
         Raises:
             EnvError: There are more nodes than a message can list.
         """
         phy = params.session.phy
-        most = min(MAX_MEMBERS, entries_per_frame(phy.max_frame) + 1)
+        most = min(MAX_MEMBERS, phy.room + 1)
         if n_nodes > most:
             raise EnvError(
                 f"radio: expected at most {most} nodes with frames of {phy.max_frame} bytes, "
@@ -102,7 +104,7 @@ class Radio:
             phy.detect,
             params.capture,
             params.clock_wander,
-            np.array([airtime(phy, FIXED_BYTES + ENTRY_BYTES * int(k)) for k in rows]),
+            np.array([airtime(phy, table_bytes(phy, int(k))) for k in rows]),
         )
         e, n = len(seeds), n_nodes
         sessions, peers = make_sessions(e, n)
@@ -120,13 +122,16 @@ class Radio:
             np.zeros(e, dtype=np.uint64),
             np.zeros(e, dtype=np.int64),
         )
+        pairs = n * (n - 1) // 2
+        self.room = room = pairs * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
+        """Largest number of ranges in a window."""
+        messages = n * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
+        self.overheard = make_overheard(e, n, overheard_windows * (messages * (n - 1) + n * room))
+        """What every node knows from its radio since the reader set `used` to 0."""
         for k, seed in enumerate(seeds):
             self.reset(k, seed)
         if clocks is not None:
             self._air.nodes["rate"] = TICK_HZ * (1.0 + clocks)
-        pairs = n * (n - 1) // 2
-        self.room = room = pairs * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
-        """Largest number of ranges in a window."""
         self._out = RangeBuffer(
             np.zeros((e, room)),
             np.zeros((e, room), dtype=np.int64),
@@ -156,6 +161,8 @@ class Radio:
         air.due[env] = np.inf
         air.channel[env] = make_channel(params.channel, KNOT)[0]
         air.seeds[env], air.window[env] = seed, 0
+        for array in self.overheard[6:]:
+            array[env] = 0
         make_nodes(air.nodes[env], air.seeds[env], params.clock_offset, params.antenna_delay_std)
 
     def part(self, envs: slice) -> Radio:
@@ -163,12 +170,13 @@ class Radio:
         part = copy.copy(self)
         part._air = Air._make(array[envs] for array in self._air)
         part._out = RangeBuffer._make(array[envs] for array in self._out)
+        part.overheard = Overheard._make(array[envs] for array in self.overheard)
         return part
 
     @property
-    def kernel_arguments(self) -> tuple[SessionNumbers, RadioNumbers, Air, RangeBuffer]:
+    def kernel_arguments(self) -> tuple[SessionNumbers, RadioNumbers, Air, RangeBuffer, Overheard]:
         """Arguments of `run_env_window` that this object holds."""
-        return self._numbers, self._radio, self._air, self._out
+        return self._numbers, self._radio, self._air, self._out, self.overheard
 
     def switch_on(self, env: int, node: int, *, boot: int, after: float = 0.0) -> None:
         """Switch a node on, `after` seconds after the start of the next window."""
@@ -198,7 +206,9 @@ class Radio:
             np.zeros((e, 0, 7)) if capsules is None else capsules,
         )
         start = self._air.window[:, None] * self._dt
-        run_window(self._numbers, self._radio, self._air, scene, self._dt, self._out)
+        run_window(
+            self._numbers, self._radio, self._air, scene, self._dt, self._out, self.overheard
+        )
         out, used = self._out, int(self._out.used.max())
         return Ranges(
             start + out.t[:, :used],

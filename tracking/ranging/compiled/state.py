@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from tracking.arrays import I64
 from tracking.ranging.compiled.exchange import FIRST_VAR, ExchangeNumbers
+from tracking.ranging.frames.airtime import table_bytes
 from tracking.ranging.frames.slots import Slots
 from tracking.ranging.frames.timestamps import ticks
-from tracking.ranging.frames.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 from tracking.ranging.params import SessionParams
 
 Records = NDArray[Any]
@@ -131,7 +131,7 @@ def session_numbers(params: SessionParams, n_nodes: int) -> SessionNumbers:
     def interval(seconds: tuple[float, float]) -> tuple[int, int]:
         return ticks(seconds[0]), ticks(seconds[1])
 
-    most = min(n_nodes, entries_per_frame(params.phy.max_frame))
+    most = min(n_nodes, params.phy.room)
     return SessionNumbers(
         slots.header,
         slots.sense,
@@ -149,7 +149,7 @@ def session_numbers(params: SessionParams, n_nodes: int) -> SessionNumbers:
         interval(params.check),
         params.drop_after,
         params.exchange.numbers(),
-        np.array([slots.frame(FIXED_BYTES + ENTRY_BYTES * k) for k in range(most + 1)]),
+        np.array([slots.frame(table_bytes(params.phy, k)) for k in range(most + 1)]),
         np.array([0] + [slots.message(n) for n in range(1, n_nodes + 1)]),
     )
 

@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 
 from tracking.errors import ConfigError
+from tracking.ranging.frames.motion import MOTION_BYTES
 from tracking.ranging.frames.wire import ENTRY_BYTES, FIXED_BYTES, entries_per_frame
 
 PHR_BITS = 21
@@ -50,9 +51,15 @@ class Phy:
     `sense`. 0 if the payload can be written during the own preamble, 1 ms long."""
     max_frame: int = 127
     """[bytes] Longest frame; up to 1023 with the long frames of the DW1000."""
+    motion_bytes: int = 0
+    """[bytes] Preintegrated motion in every message with a table, see `frames.motion`: 0 or 24."""
 
     def __post_init__(self) -> None:
-        least = FIXED_BYTES + ENTRY_BYTES
+        if self.motion_bytes not in (0, MOTION_BYTES):
+            raise ConfigError(
+                f"motion_bytes: expected 0 or {MOTION_BYTES}, got {self.motion_bytes}"
+            )
+        least = FIXED_BYTES + ENTRY_BYTES + self.motion_bytes
         if not least <= self.max_frame <= 1023:
             raise ConfigError(f"max_frame: expected {least} to 1023 bytes, got {self.max_frame}")
         if not 0.0 < self.turnaround + self.detect < self.sense:
@@ -64,6 +71,11 @@ class Phy:
     def gap(self) -> float:
         """Silence between two messages, in which all nodes listen for newcomers [s]."""
         return max(self.sense + self.turnaround, self.processing)
+
+    @property
+    def room(self) -> int:
+        """Number of table rows that fit into a frame [-]."""
+        return entries_per_frame(self.max_frame - self.motion_bytes)
 
     @property
     def header_time(self) -> float:
@@ -95,6 +107,11 @@ FAST_PHY = Phy(
 PHYS = {phy.name: phy for phy in (PAPER_PHY, FAST_PHY)}
 
 
+def table_bytes(phy: Phy, entries: int) -> int:
+    """Return the bytes of a frame with a number of table rows; without a table it has no motion."""
+    return FIXED_BYTES + ENTRY_BYTES * entries + (phy.motion_bytes if entries else 0)
+
+
 def airtime(phy: Phy, frame_bytes: int) -> float:
     """Return the time on the air of a frame of `frame_bytes` bytes [s]."""
     data = 8 * frame_bytes
@@ -104,10 +121,10 @@ def airtime(phy: Phy, frame_bytes: int) -> float:
 
 def message_time(phy: Phy, n_nodes: int) -> float:
     """Return the time from one message of a round to the next, for n nodes [s]."""
-    left, total, most = n_nodes - 1, 0.0, entries_per_frame(phy.max_frame)
+    left, total = n_nodes - 1, 0.0
     while True:
-        entries = min(left, most)
-        total += airtime(phy, FIXED_BYTES + ENTRY_BYTES * entries) + phy.gap
+        entries = min(left, phy.room)
+        total += airtime(phy, table_bytes(phy, entries)) + phy.gap
         left -= entries
         if left <= 0:
             return total
