@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from tracking.ranging.exchange import RangeEvent
+from tracking.ranging.frames.motion import Motion
 
 
 class Role(Enum):
@@ -80,5 +81,18 @@ class DuplicateId:
     """Boot number of the other node."""
 
 
-Event = RangeEvent | RoleChanged | MembersChanged | DuplicateId
+@dataclass(frozen=True, slots=True)
+class MotionEvent:
+    """Preintegrated motion of another node, see `tracking.ranging.frames.motion`."""
+
+    id: int
+    """Node that moved."""
+    boot: int
+    """Boot number of the node: sums of different boots do not belong together."""
+    time: int
+    """Time of the sums, this node's clock, 40-bit stamp."""
+    motion: Motion
+
+
+Event = RangeEvent | MotionEvent | RoleChanged | MembersChanged | DuplicateId
 Output = Transmission | Event

@@ -6,9 +6,11 @@ that also received these messages knows both of their ends, and so the range of 
 
 from __future__ import annotations
 
-from tracking.ranging.events import Reception
+from tracking.errors import WireError
+from tracking.ranging.events import MotionEvent, Reception
 from tracking.ranging.exchange import ExchangeParams, Exchanges, Passage, RangeEvent
-from tracking.ranging.frames.timestamps import MODULUS, difference
+from tracking.ranging.frames.motion import AGE_UNIT, decode_motion
+from tracking.ranging.frames.timestamps import MODULUS, TICK_HZ, difference
 from tracking.ranging.frames.wire import Entry, Frame
 from tracking.ranging.peers import Peer, Peers
 
@@ -33,11 +35,13 @@ class Listener:
         self._last_sent = sent
         self.peers.begin_table()
 
-    def take(self, frame: Frame, reception: Reception, arrived: int) -> list[RangeEvent] | None:
+    def take(
+        self, frame: Frame, reception: Reception, arrived: int
+    ) -> list[RangeEvent | MotionEvent] | None:
         """Process a message that arrived at a time of the own clock.
 
         Returns:
-            The ranges that it completes; None for a repeated or late message.
+            The ranges that it completes, and its motion; None for a repeated or late message.
         """
         goes_on = self.peers.take(frame, arrived)
         if goes_on is None:
@@ -46,9 +50,23 @@ class Listener:
             self._exchanges.forget(frame.src)
         src = self.peers[frame.src]
         src.rx_power, src.fp_power, src.fresh = reception.rx_power, reception.fp_power, True
+        events: list[RangeEvent | MotionEvent | None]
         events = [self._overhear(frame, src, row, arrived) for row in frame.entries]
         events.append(self._receive(frame, src, reception, arrived))
+        events.append(self._read_motion(frame, arrived))
         return [event for event in events if event is not None]
+
+    @staticmethod
+    def _read_motion(frame: Frame, arrived: int) -> MotionEvent | None:
+        """Return the motion of a message; None without one, or if it is invalid."""
+        if not frame.motion:
+            return None
+        try:
+            motion = decode_motion(frame.motion)
+        except WireError:
+            return None
+        at = arrived - round(motion.age * AGE_UNIT * TICK_HZ)
+        return MotionEvent(frame.src, frame.boot, at % MODULUS, motion)
 
     def _overhear(self, frame: Frame, src: Peer, row: Entry, arrived: int) -> RangeEvent | None:
         """Process one row of a table: the time at which the sender received that node."""

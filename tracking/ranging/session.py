@@ -52,7 +52,7 @@ class Session:
         self.id, self._params, self._boot = node_id, params, boot & 0xFF
         self.role, self.root, self.round = Role.LISTENING, node_id, 0
         self._slots, self._dice = Slots(params.phy), Dice(node_id, boot)
-        self._transmitter = Transmitter(node_id, params, self._slots, self._boot)
+        self.transmitter = Transmitter(node_id, params, self._slots, self._boot)
         self._listener, self._members = Listener(node_id, params.exchange), Members(node_id)
         self._peers = self._listener.peers
         self._turns = Turns(node_id, params, self._slots, self._members, self._peers, self._dice)
@@ -168,9 +168,9 @@ class Session:
         n = len(self._members)
         rows = []
         if kind is not Type.JOIN:
-            rows = self._peers.table(self._members.others(), self._transmitter.room)
+            rows = self._peers.table(self._members.others(), self.transmitter.room)
         words = Words(kind, root, self.round, min(turns.cursor, n), n, rows)
-        frames, sent, turns.expected = self._transmitter.say(words, at)
+        frames, sent, turns.expected = self.transmitter.say(words, at)
         self._out += frames
         self._listener.note_sent(sent)
         turns.cursor += kind is not Type.JOIN
@@ -242,7 +242,7 @@ class Session:
             return
         words = Words(Type.ALERT, frame.root, frame.round, min(frame.slot + 1, frame.n), frame.n)
         at = max(end, self._time.now + self._slots.header) + self._slots.turnaround
-        self._out += self._transmitter.say(words, at)[0]
+        self._out += self.transmitter.say(words, at)[0]
         self._forget()
         self.role, self.root = Role.MUTED, self.id
         self._turns.wait(Waiting.WATCHDOG, self._time.now + self._dice.pause(self._params.mute))

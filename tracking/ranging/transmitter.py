@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tracking.ranging.events import Transmission
+from tracking.ranging.frames.motion import AGE_UNIT, Motion, encode_motion
 from tracking.ranging.frames.slots import Slots
-from tracking.ranging.frames.timestamps import MODULUS, on_grid
+from tracking.ranging.frames.timestamps import MODULUS, TICK_HZ, difference, on_grid
 from tracking.ranging.frames.wire import (
     MAX_PARTS,
     Entry,
     Frame,
     Type,
     encode,
-    entries_per_frame,
     split,
 )
 from tracking.ranging.params import SessionParams
@@ -38,8 +38,19 @@ class Transmitter:
     def __init__(self, node_id: int, params: SessionParams, slots: Slots, boot: int) -> None:
         self._id, self._params, self._slots, self._boot = node_id, params, slots, boot
         self._sequence = 0
-        self.room = MAX_PARTS * entries_per_frame(params.phy.max_frame)
+        self.room = MAX_PARTS * params.phy.room
         """Number of rows that a message can have."""
+        self._motion: tuple[Motion, int] | None = None
+
+    def set_motion(self, motion: Motion | None, at: int) -> None:
+        """Set the motion that the next messages carry, if `Phy.motion_bytes` has room for it.
+
+        Args:
+            motion: Sums at the last inertial sample; the age is set when a message is sent. None
+                if the orientation is unknown.
+            at: Time of the sample, own clock, 40-bit stamp.
+        """
+        self._motion = None if motion is None else (motion, at)
 
     def say(self, words: Words, at: int) -> tuple[list[Transmission], int, int]:
         """Build the frames of a message.
@@ -53,7 +64,8 @@ class Transmitter:
             message.
         """
         out = []
-        parts = split(words.rows, self._params.phy.max_frame)
+        phy = self._params.phy
+        parts = split(words.rows, phy.max_frame - phy.motion_bytes)
         stamp = at
         for p, rows in enumerate(parts):
             at = on_grid(at)
@@ -61,9 +73,18 @@ class Transmitter:
             frame = Frame(
                 words.type, self._id, words.root, words.round, words.slot, words.n, self._boot,
                 stamp % MODULUS, rows, self._params.pan, self._sequence, p, len(parts),
+                self._motion_at(stamp) if rows and p + 1 == len(parts) else b"",
             )  # fmt: skip
             data = encode(frame)
             self._sequence = (self._sequence + 1) % 256
             out.append(Transmission(data, at % MODULUS))
             at += self._slots.frame(len(data)) + self._slots.gap
         return out, stamp, at
+
+    def _motion_at(self, stamp: int) -> bytes:
+        """Return the bytes of the motion for a message; none if it is unknown or too old."""
+        if self._motion is None or not self._params.phy.motion_bytes:
+            return b""
+        motion, at = self._motion
+        age = round(difference(stamp % MODULUS, at) / TICK_HZ / AGE_UNIT)
+        return encode_motion(replace(motion, age=age)) if 0 <= age < 1 << 16 else b""

@@ -51,7 +51,8 @@ largest added noise density since the last message [m/s2/sqrt(Hz)]."""
 
 RECEIVED = np.dtype(
     [("known", "?"), ("epoch", "i8"), ("t", "f8")]
-    + [(f"{name}{k}", "i8") for name in ("v", "p", "q") for k in range(3)]
+    + [(f"{name}{k}", "i8") for name in ("v", "p") for k in range(3)]
+    + [(f"q{k}", "i8") for k in range(4)]
 )
 """Last message of one node at another one: epoch, time of the sums [s], and the sums in counts."""
 
@@ -87,22 +88,44 @@ def noise_density(byte):
 
 @small_kernel
 def rotation_counts(w, x, y, z):
-    """Return the counts of a unit quaternion; the sign of a quaternion has no meaning."""
-    scale = (1.0 if w >= 0.0 else -1.0) / ROTATION_UNIT
+    """Return the index of the largest component of a quaternion, and counts of the others.
+
+    The largest is positive: the sign of a quaternion has no meaning.
+    """
+    q, largest = (w, x, y, z), 0
+    for k in range(1, 4):
+        if abs(q[k]) > abs(q[largest]):
+            largest = k
+    scale = (1.0 if q[largest] >= 0.0 else -1.0) / ROTATION_UNIT
+    first, second, third = (largest == 0), 1 + (largest <= 1), 2 + (largest <= 2)
     return (
-        int(math.floor(scale * x + 0.5)),
-        int(math.floor(scale * y + 0.5)),
-        int(math.floor(scale * z + 0.5)),
+        largest,
+        round_count(scale * q[int(first)]),
+        round_count(scale * q[second]),
+        round_count(scale * q[third]),
     )
 
 
 @small_kernel
-def rotation_of(i, j, k):
-    """Return the unit quaternion w x y z of three counts."""
+def round_count(x):
+    """Return a number as a count of 15 bits."""
+    return min(max(int(math.floor(x + 0.5)), -16384), 16383)
+
+
+@small_kernel
+def rotation_of(largest, i, j, k):
+    """Return the unit quaternion w x y z of an index and three counts."""
     x, y, z = i * ROTATION_UNIT, j * ROTATION_UNIT, k * ROTATION_UNIT
-    w = math.sqrt(max(1.0 - x * x - y * y - z * z, 0.0))
-    norm = math.sqrt(w * w + x * x + y * y + z * z)
-    return w / norm, x / norm, y / norm, z / norm
+    big = math.sqrt(max(1.0 - x * x - y * y - z * z, 0.0))
+    norm = math.sqrt(big * big + x * x + y * y + z * z)
+    big, x, y, z = big / norm, x / norm, y / norm, z / norm
+    if largest == 0:
+        return big, x, y, z
+    if largest == 1:
+        return x, big, y, z
+    if largest == 2:
+        return x, y, big, z
+    return x, y, z, big
 
 
 @small_kernel
@@ -164,14 +187,14 @@ def receive_motion(s, r, sent, node, out, e):
         to_counts(py, POSITION_UNIT, POSITION_BITS),
         to_counts(pz, POSITION_UNIT, POSITION_BITS),
     )
-    q0, q1, q2 = rotation_counts(qw, qx, qy, qz)
+    q0, q1, q2, q3 = rotation_counts(qw, qx, qy, qz)
     noise = noise_density(noise_byte(s.noise))
     if r.known and r.epoch == s.epoch and 0.0 < t - r.t <= LONGEST:
         dt = t - r.t
         ax, bx = mean_accelerations(r.v0, r.p0, v0, p0, dt)
         ay, by = mean_accelerations(r.v1, r.p1, v1, p1, dt)
         az, bz = mean_accelerations(r.v2, r.p2, v2, p2, dt)
-        first, last = rotation_of(r.q0, r.q1, r.q2), rotation_of(q0, q1, q2)
+        first, last = rotation_of(r.q0, r.q1, r.q2, r.q3), rotation_of(q0, q1, q2, q3)
         middle = half_way(first, last)
         if dt <= SHORT:
             mean = (0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz))
@@ -183,7 +206,7 @@ def receive_motion(s, r, sent, node, out, e):
     if not r.known or t > r.t:
         r.known, r.epoch, r.t = True, s.epoch, t
         r.v0, r.v1, r.v2, r.p0, r.p1, r.p2 = v0, v1, v2, p0, p1, p2
-        r.q0, r.q1, r.q2 = q0, q1, q2
+        r.q0, r.q1, r.q2, r.q3 = q0, q1, q2, q3
 
 
 @small_kernel

@@ -1,7 +1,8 @@
 """What a node knows from the messages that it receives: for simulated trackers on each node.
 
 The compiled session computes a range at its asker only. Third nodes, and the answerer, compute it
-from the same stamps one message of the asker later; with perfect arithmetic the result is equal.
+from the same stamps one message of the asker later. Left out: exchanges whose question is older
+than the asker's last message, which they complete after a loss.
 """
 
 from __future__ import annotations

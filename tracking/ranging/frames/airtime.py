@@ -108,7 +108,7 @@ PHYS = {phy.name: phy for phy in (PAPER_PHY, FAST_PHY)}
 
 
 def table_bytes(phy: Phy, entries: int) -> int:
-    """Return the bytes of a frame with a number of table rows; without a table it has no motion."""
+    """Return the bytes of the last frame of a message, which has the motion, if it has a table."""
     return FIXED_BYTES + ENTRY_BYTES * entries + (phy.motion_bytes if entries else 0)
 
 
@@ -124,8 +124,9 @@ def message_time(phy: Phy, n_nodes: int) -> float:
     left, total = n_nodes - 1, 0.0
     while True:
         entries = min(left, phy.room)
-        total += airtime(phy, table_bytes(phy, entries)) + phy.gap
         left -= entries
+        frame = table_bytes(phy, entries) if left <= 0 else FIXED_BYTES + ENTRY_BYTES * entries
+        total += airtime(phy, frame) + phy.gap
         if left <= 0:
             return total
 

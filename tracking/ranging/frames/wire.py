@@ -8,7 +8,7 @@ Every node sends the same layout, little-endian, in an IEEE 802.15.4 data frame:
     3       2      PAN, which separates groups that must not range with each other
     5       2      destination, 0xFFFF: all
     7       2      source: ID of the sender, 0 to 254
-    9       1      version (high four bits), type (low four bits)
+    9       1      version (high four bits), 8 if there is a motion, plus the type
     10      1      root: ID of the initiator that the sender follows
     11      1      round, counted by the initiator
     12      1      slot of this message in the round
@@ -17,13 +17,14 @@ Every node sends the same layout, little-endian, in an IEEE 802.15.4 data frame:
     15      1      boot: a random number drawn when the sender was switched on
     16      5      time stamp of this very transmission
     21      7 k    the table: ID 1, receive time stamp 5, quality 1
-    21+7k   2      check sum, CRC-16 of IEEE 802.15.4
+    21+7k   24     preintegrated motion of the sender, see `motion`, if there is one
+    end     2      check sum, CRC-16 of IEEE 802.15.4
 
 The first n - 1 rows of the table are the other members of the round by rising ID; then come other
 received nodes. A `JOIN` has no table. A table too long for a frame is split: every part is a
-transmission of its own, with its own time stamp. Quality: high four bits the received power in
-steps of 3 dB below -60 dBm, 15 if the node was not received since the sender's last message; low
-four bits received minus first-path power in dB.
+transmission of its own, with its own time stamp; the last one may have a motion. Quality: high four
+bits the received power in steps of 3 dB below -60 dBm, 15 if the node was not received since the
+sender's last message; low four bits received minus first-path power in dB.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from tracking.errors import WireError
+from tracking.ranging.frames.motion import MOTION_BYTES
 from tracking.ranging.frames.timestamps import MODULUS
 
 VERSION = 1
@@ -46,6 +48,7 @@ MAX_PARTS = 16
 _HEADER = struct.Struct("<HBHHHBBBBBBB")
 _FRAME_CONTROL = 0x8841
 _BROADCAST = 0xFFFF
+_HAS_MOTION = 8
 _NOT_RECEIVED = 15
 _POWER_TOP, _POWER_STEP = -60.0, 3.0
 
@@ -94,6 +97,8 @@ class Frame:
     sequence: int = 0
     part: int = 0
     parts: int = 1
+    motion: bytes = b""
+    """Motion of the sender, see `frames.motion`; empty for none."""
 
 
 def entries_per_frame(max_frame: int) -> int:
@@ -125,7 +130,7 @@ def encode(frame: Frame) -> bytes:
         frame.pan,
         _BROADCAST,
         frame.src,
-        VERSION << 4 | frame.type,
+        VERSION << 4 | frame.type | (_HAS_MOTION if frame.motion else 0),
         frame.root,
         frame.round,
         frame.slot,
@@ -138,6 +143,7 @@ def encode(frame: Frame) -> bytes:
         bytes((e.id,)) + (e.stamp or 0).to_bytes(5, "little") + bytes((_quality(e),))
         for e in frame.entries
     )
+    body += frame.motion
     return body + crc16(body).to_bytes(2, "little")
 
 
@@ -147,11 +153,17 @@ def decode(data: bytes) -> Frame:
     Raises:
         WireError: The bytes are invalid; the message names the field.
     """
-    rows, rest = divmod(len(data) - FIXED_BYTES, ENTRY_BYTES)
-    if len(data) < FIXED_BYTES or rest:
-        raise WireError(f"length: expected {FIXED_BYTES} + {ENTRY_BYTES} k bytes, got {len(data)}")
+    rest = (len(data) - FIXED_BYTES) % ENTRY_BYTES
+    if len(data) < FIXED_BYTES or rest not in (0, MOTION_BYTES % ENTRY_BYTES):
+        raise WireError(
+            f"length: expected {FIXED_BYTES} + {ENTRY_BYTES} k bytes, and {MOTION_BYTES} with a "
+            f"motion, got {len(data)}"
+        )
     if crc16(data[:-2]) != int.from_bytes(data[-2:], "little"):
         raise WireError("check sum: does not fit")
+    end = len(data) - 2 - (MOTION_BYTES if data[9] & _HAS_MOTION else 0)
+    if end + 2 < FIXED_BYTES or (end + 2 - FIXED_BYTES) % ENTRY_BYTES:
+        raise WireError(f"length: {len(data)} bytes do not fit the flag of a motion")
     control, sequence, pan, to, src, kind, root, round_, slot, n, part, boot = _HEADER.unpack(
         data[: _HEADER.size]
     )
@@ -159,11 +171,12 @@ def decode(data: bytes) -> Frame:
         raise WireError("frame control: not a broadcast of ours")
     if kind >> 4 != VERSION:
         raise WireError(f"version: expected {VERSION}, got {kind >> 4}")
-    if kind & 15 not in Type._value2member_map_:
-        raise WireError(f"type: unknown, {kind & 15}")
+    kind &= 7
+    if kind not in Type._value2member_map_:
+        raise WireError(f"type: unknown, {kind}")
     if src > MAX_ID or root > MAX_ID:
         raise WireError(f"source, root: expected IDs up to {MAX_ID}, got {src}, {root}")
-    if root > src and kind & 15 in (Type.REQUEST, Type.REPLY):
+    if root > src and kind in (Type.REQUEST, Type.REPLY):
         raise WireError(f"root: expected at most the source {src}, got {root}")
     part, parts = part >> 4, (part & 15) + 1
     if part >= parts:
@@ -171,16 +184,15 @@ def decode(data: bytes) -> Frame:
     if n < 1 or slot > n:
         raise WireError(f"slot: expected at most n = {n}, got {slot}")
     entries = tuple(
-        _entry(data[at : at + ENTRY_BYTES])
-        for at in range(FIXED_BYTES - 2, len(data) - 2, ENTRY_BYTES)
+        _entry(data[at : at + ENTRY_BYTES]) for at in range(FIXED_BYTES - 2, end, ENTRY_BYTES)
     )
     ids = [e.id for e in entries]
     if len(set(ids)) < len(ids) or src in ids:
         raise WireError("table: a duplicate ID")
     stamp = int.from_bytes(data[16:21], "little")
     return Frame(
-        Type(kind & 15), src, root, round_, slot, n, boot, stamp, entries, pan, sequence,
-        part, parts,
+        Type(kind), src, root, round_, slot, n, boot, stamp, entries, pan, sequence,
+        part, parts, data[end:-2],
     )  # fmt: skip
 
 
