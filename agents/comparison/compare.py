@@ -15,6 +15,7 @@ from agents.comparison.setting import Setting
 from agents.errors import UsageError
 from agents.jobs import check_jobs, find_engine
 from agents.simulation.demo import SETTLE
+from relpos_env.core.tracked_world import Trackers
 from relpos_env.interface.rangefinders import MAX_RANGEFINDERS
 
 FIRST_SEED = 1000
@@ -31,6 +32,7 @@ def compare(
     task: str = "ring",
     task_options: Mapping[str, Any] | None = None,
     cars: int | None = None,
+    trackers: Trackers = "group",
     level: int | None = None,
     operator: float = 1.0,
     proximity: int | None = None,
@@ -56,6 +58,7 @@ def compare(
         task: One of `relpos_env.tasks.TASKS`.
         task_options: Options of the task, by name.
         cars: Slots for cars; by default the maximum of the scenario.
+        trackers: `group` for one tracker of the group, `own` for one on each car.
         level: Curriculum level of the randomisation, 0 to 4.
         operator: Share of episodes with an operator; in the others cars only follow the plan, as
             real cars without a remote control do [-].
@@ -86,6 +89,7 @@ def compare(
             task=task,
             task_options=dict(task_options or {}),
             cars=cars,
+            trackers=trackers,
             level=level,
             operator=operator,
             seconds=seconds,

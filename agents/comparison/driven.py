@@ -62,6 +62,11 @@ class Driven:
         return self._unknown
 
     @property
+    def disagreement(self) -> F64:
+        """NaN: one tracker serves the group, (1, car)."""
+        return self._unknown
+
+    @property
     def collisions(self) -> F64:
         """Not measurable on hardware; NaN, (1, car)."""
         return self._unknown

@@ -39,6 +39,9 @@ class EpisodeResult:
     the task has no goals."""
     tracking_error: float
     """[m] Error of the usable relative positions, mean over cars and the scored time."""
+    disagreement: float
+    """[m] Difference of two cars' estimates of each other, mean over cars and the scored time;
+    NaN with one tracker for the group."""
     collisions_per_min: float
     """[1/min] Collisions (onsets of contact), summed over the cars, whole episode."""
     contact_time: float
@@ -89,6 +92,10 @@ class Running(Protocol):
         """Error of the usable relative positions, (env, car) [m]."""
 
     @property
+    def disagreement(self) -> F64:
+        """Difference of two cars' estimates of each other, (env, car) [m]; NaN for one tracker."""
+
+    @property
     def collisions(self) -> F64:
         """Collisions that began in the last control step, (env, car) [-]."""
 
@@ -126,9 +133,8 @@ class Meter:
         """True for episodes that have not ended, (env,)."""
         self._cycles = np.zeros(e, dtype=np.int64)
         self._done = np.zeros(e, dtype=bool)
-        self._error, self._place, self._tracking, self._worst = np.full(
-            (4, e, running.cycles), np.nan
-        )
+        self._error, self._place, self._worst = np.full((3, e, running.cycles), np.nan)
+        self._tracking, self._disagreement = np.full((2, e, running.cycles), np.nan)
         self._collisions, self._touching, self._here = np.zeros((3, e))
         self._work, self._car_time = np.zeros((2, e))
 
@@ -140,7 +146,7 @@ class Meter:
         work = _work(self._speed, speed, *self._car)
         # Cars that joined or left during the step are not counted.
         driven = present & self._present
-        tracking, place = r.tracking_error, r.place_error
+        tracking, disagreement, place = r.tracking_error, r.disagreement, r.place_error
         for e in np.flatnonzero(self.going).tolist():
             k, here = int(self._cycles[e]), present[e]
             if here.any():
@@ -150,6 +156,9 @@ class Meter:
             known = np.isfinite(tracking[e])
             if known.any():
                 self._tracking[e, k] = tracking[e, known].mean()
+            known = np.isfinite(disagreement[e])
+            if known.any():
+                self._disagreement[e, k] = disagreement[e, known].mean()
             self._collisions[e] += collisions[e].sum()
             self._touching[e] += touching[e, here].sum()
             self._here[e] += here.sum()
@@ -180,6 +189,7 @@ class Meter:
             formation_error=_mean(self._error[env, scored]),
             place_error=_mean(self._place[env, scored]),
             tracking_error=_mean(self._tracking[env, scored]),
+            disagreement=_mean(self._disagreement[env, scored]),
             collisions_per_min=60.0 * self._collisions[env] / seconds,
             contact_time=self._touching[env] / max(self._here[env], 1.0),
             time_in_formation=_mean((worst < IN_FORMATION)[np.isfinite(worst)]),

@@ -16,8 +16,8 @@ from tracking.arrays import F64
 from tracking.params.short_repr import short_repr
 
 FIGURES = (
-    "formation_error", "place_error", "tracking_error", "collisions_per_min", "contact_time",
-    "time_in_formation", "energy",
+    "formation_error", "place_error", "tracking_error", "disagreement", "collisions_per_min",
+    "contact_time", "time_in_formation", "energy",
 )  # fmt: skip
 """Metrics of every episode, see `agents.comparison.meter.EpisodeResult`."""
 
@@ -146,6 +146,7 @@ class CompareResult:
             "proximity": row.contender.proximity,
             "scenario": row.scenario,
             "task": row.setting.task,
+            "trackers": row.setting.trackers,
             "level": row.setting.level,
             "operator": row.setting.operator,
             "cars": row.cars,

@@ -9,6 +9,7 @@ from typing import Any
 
 from agents.simulation.demo import SETTLE
 from relpos_env.config import Parts, configure
+from relpos_env.core.tracked_world import Trackers
 from relpos_env.sensors.operator import OperatorSimParams
 from relpos_env.timing import DECISION
 
@@ -25,6 +26,8 @@ class Setting:
     """Options of the task, by name."""
     cars: int | None = None
     """[-] Slots for cars; by default the maximum of the scenario."""
+    trackers: Trackers = "group"
+    """One tracker of the group, or one on each car."""
     level: int | None = None
     """Curriculum level of the randomisation, 0 to 4, in place of the scenario's own."""
     operator: float = 1.0
@@ -61,6 +64,7 @@ class Setting:
                 "task": self.task,
                 "task_options": self.task_options,
                 "n_cars": self.cars,
+                "trackers": self.trackers,
                 "level": self.level,
                 "operator": OperatorSimParams(share=self.operator),
                 "observation": observation,

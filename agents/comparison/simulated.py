@@ -78,6 +78,15 @@ class Simulated:
         return self.formation.tracking_error()
 
     @property
+    def disagreement(self) -> F64:
+        """Difference of two cars' estimates of each other, (env, car) [m]; NaN for one tracker."""
+        formation = self.formation
+        if formation.parts.config.trackers == "group":
+            return np.full(formation.rewards.shape, np.nan)
+        disagreement: F64 = formation.infos()["disagreement"]
+        return disagreement
+
+    @property
     def collisions(self) -> F64:
         """Collisions that began in the last control step, (env, car) [-]."""
         return self.formation.loop.swarm.contacts

@@ -22,6 +22,7 @@ LABELS = {
     "formation_error": "formation error [m]",
     "place_error": "distance from the goals [m]",
     "tracking_error": "tracking error [m]",
+    "disagreement": "disagreement of two cars [m]",
     "collisions_per_min": "collisions [1/min]",
     "contact_time": "time in contact [%]",
     "time_in_formation": f"time below {IN_FORMATION:g} m [%]",

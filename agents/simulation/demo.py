@@ -72,9 +72,8 @@ class DemoResult:
     @property
     def summary(self) -> list[dict[str, Any]]:
         """JSON records, one per filter and one for the formation."""
-        rows: list[dict[str, Any]] = [{"result": "tracking", **r.summary} for r in self.tracks]
         return [
-            *rows,
+            *({"result": "tracking", **r.summary} for r in self.tracks),
             {
                 "result": "formation",
                 "scenario": self.scenario,
@@ -120,8 +119,7 @@ def demo(
         cars: Number of cars; by default that of the scenario.
         proximity: Distance sensors per car; by default those of the policy, or none.
         controller: One of `agents.controllers.CONTROLLERS`, by default `CONTROLLER`.
-        policy: A trained policy that replaces the controller, as for `load_policy`; the cars use
-            its observation mode.
+        policy: A trained policy, as for `load_policy`, in place of the controller.
         filter: Filter of the cars, one of `tracking.filters.FILTERS`.
         filters: Filters that track the recorded drive for comparison.
         window: Show the drive on estimates in a window; needs pygame.

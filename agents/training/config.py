@@ -27,6 +27,8 @@ class EnvSetup:
     """Number of stacked observations, the newest first."""
     proximity: int = number(0, 0, 32)
     """Number of distance sensors around each car, which measure walls, boxes and cars."""
+    trackers: Literal["group", "own"] = "group"
+    """One tracker of the group, or one on each car, see `relpos_env.config`."""
     cars: int = number(6, 2, 20)
     """Number of car slots, 2 to 20: the largest group that the policy can drive, at least the
     cars of the scenarios."""

@@ -43,6 +43,7 @@ def env_arguments(
         "scenario": Path(scenario) if scenario.endswith(".toml") else scenario,
         "task": env.task,
         "level": level,
+        "trackers": env.trackers,
         "observation": env.observation,
         "history": env.history,
         "weights": weights_of(config, done),

@@ -130,7 +130,8 @@ class LiveGroup:
         swarm = self.swarm
         unknown = np.full((1, self.estimated.present.shape[1]), np.nan)
         write_figures(
-            self.task.error, unknown, swarm.view.ok, swarm.view.present, self._no_cars,
+            self.task.error, unknown, swarm.view.ok, swarm.view.pos, swarm.view.present,
+            self._no_cars,
             self.task.rewards, self._weights, self.task.done, self._figures,
         )  # fmt: skip
         columns = car_columns(

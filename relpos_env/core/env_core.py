@@ -278,8 +278,9 @@ class EnvCore:
         self._judge_all = bind(judge, 0, self.n_envs, *self._verdict)
         self._compare = bind(tracking_errors, swarm.body, view.pos, view.ok, self._tracking_error)
         self._figure = bind(
-            write_figures, self.task.error, self._tracking_error, view.ok, self.state.present,
-            swarm.contacts, self.task.rewards, self.weights, self.task.done, self._figures,
+            write_figures, self.task.error, self._tracking_error, view.ok, view.pos,
+            self.state.present, swarm.contacts, self.task.rewards, self.weights, self.task.done,
+            self._figures,
         )  # fmt: skip
         columns = car_columns(self._figures, self.task.terms, self.state.present, self.active)
         self._columns = columns | (

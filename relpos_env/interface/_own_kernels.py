@@ -111,23 +111,3 @@ def note_own_ranges(own, view):
                 view.t_last_range[e, car, other] = own.t[row, k]
                 view.distance[e, car, other] = own.values[row, k, 0]
                 view.gap[e, car, other] = own.values[row, k, 1] - own.values[row, k, 2]
-
-
-@kernel
-def disagreement(view, out):
-    """Write how much two cars disagree about their relative position.
-
-    Args:
-        view: AgentView.
-        out: RMS over the pairs that both cars have ok, (env) [m]; NaN without such a pair. The
-            estimate of b by a and that of a by b are in one frame, north, and should cancel.
-    """
-    for e in range(out.shape[0]):
-        total, n = 0.0, 0
-        for a in range(view.ok.shape[1]):
-            for b in range(a + 1, view.ok.shape[1]):
-                if view.ok[e, a, b] and view.ok[e, b, a]:
-                    x = view.pos[e, a, b, 0] + view.pos[e, b, a, 0]
-                    y = view.pos[e, a, b, 1] + view.pos[e, b, a, 1]
-                    total, n = total + x * x + y * y, n + 1
-        out[e] = math.sqrt(total / n) if n > 0 else math.nan

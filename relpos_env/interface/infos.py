@@ -4,6 +4,7 @@
 |---|---|---|
 | ``formation_error`` | mean distance of others from their targets [m]; inf while absent | mean |
 | ``tracking_error`` | mean error of the estimates [m]; inf without estimates | mean |
+| ``disagreement`` | RMS of the difference of two cars' estimates of each other [m] | mean |
 | ``tracked`` | number of others with a usable estimate | mean |
 | ``collisions`` | number of contacts begun in the step; not on hardware | sum |
 | ``present`` | True if in the room | per car |
@@ -34,6 +35,7 @@ class Figures(NamedTuple):
 
     formation_error: F64
     tracking_error: F64
+    disagreement: F64
     tracked: I64
     collisions: I64
     is_success: Bool
@@ -45,6 +47,7 @@ def make_figures(n_envs: int, n_cars: int, n_terms: int) -> Figures:
     """Allocate the info values."""
     shape = n_envs, n_cars
     return Figures(
+        np.zeros(shape),
         np.zeros(shape),
         np.zeros(shape),
         np.zeros(shape, dtype=np.int64),
@@ -69,6 +72,7 @@ def car_columns(
     columns: Columns = {
         "formation_error": figures.formation_error,
         "tracking_error": figures.tracking_error,
+        "disagreement": figures.disagreement,
         "tracked": figures.tracked,
         "collisions": figures.collisions,
         "present": present,

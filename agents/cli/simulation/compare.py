@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 SIMULATED = {
     "scenarios": "--scenario", "task": "--task", "cars": "--cars", "proximity": "--proximity",
-    "level": "--level", "operator": "--operator", "first_seed": "--first-seed",
-    "jobs": "--jobs", "engine": "--engine",
+    "trackers": "--trackers", "level": "--level", "operator": "--operator",
+    "first_seed": "--first-seed", "jobs": "--jobs", "engine": "--engine",
     "address": "--address",
 }  # fmt: skip
 """Options that are not allowed with real cars, by parameter."""
@@ -49,6 +49,13 @@ WHY = "which has its own cars and task; they drive one after the other"
     "--proximity",
     type=int,
     help="Number of distance sensors on each car, 0 to 32.  [default: those of the policies]",
+)
+@click.option(
+    "--trackers",
+    type=click.Choice(["group", "own"]),
+    default="group",
+    show_default=True,
+    help="group: one tracker receives the samples of all cars; own: one on each car.",
 )
 @click.option(
     "--level", type=int, help="Curriculum level of the randomisation, 0 to 4, in every scenario."
