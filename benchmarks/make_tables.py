@@ -309,6 +309,25 @@ def time_to_ok() -> str:
     return markdown(head, rows, right=", ".join(head[1:]))
 
 
+def own_trackers() -> str:
+    """Return the table of one tracker for the group and of a tracker on each car."""
+    head = ("loss", "trackers", "error [m]", "ratio", "`ok`", "`ok` and wrong by 0.5 m",
+            "disagreement [m]", "ranges of a pair [Hz]")  # fmt: skip
+    rows, of_group = [], 1.0
+    for line in (MEASURED / "own-trackers.jsonl").read_text().splitlines():
+        r = json.loads(line)
+        of_group = r["error"] if r["trackers"] == "group" else of_group
+        is_own = r["trackers"] == "own"
+        loss = "as in the scenario" if r["loss"] is None else f"{100.0 * r['loss']:.0f} %"
+        rows.append([
+            "" if is_own else loss, r["trackers"], f"{r['error']:.3f}",
+            f"{r['error'] / of_group:.2f}" if is_own else "", f"{100.0 * r['ok']:.1f} %",
+            f"{100.0 * r['wrong']:.2f} %", f"{r['disagreement']:.3f}" if is_own else "",
+            f"{r['ranges_hz']:.0f}",
+        ])  # fmt: skip
+    return markdown(head, rows, right=", ".join(head[2:]))
+
+
 def policy_results() -> str:
     """Return the table of errors of the shipped policy with distance sensors and of controllers."""
     head = ("room", "cars", "driver", "error", "95 %", "place", "tracking", "collisions/min",
@@ -414,6 +433,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "faults": faults,
     "findings": findings,
     "second-world": second_world,
+    "own-trackers": own_trackers,
     "time-to-ok": time_to_ok,
     "policy-results": policy_results,
     "room-results": room_results,
