@@ -9,10 +9,9 @@ import math
 
 from tracking.kernels.jit import kernel, small_kernel
 from tracking.ranging.compiled.motion import integrate_state, receive_motion
+from tracking.ranging.compiled.overheard import RANGE, RECEIVED_MESSAGE
 
-JOIN, STATE, RANGE, LEAVE = 0, 3, 5, 6
-MESSAGE = -1
-"""Kind of a received message in `Overheard`."""
+JOIN, STATE, LEAVE = 0, 3, 6
 
 
 @kernel
@@ -25,7 +24,7 @@ def share_events(block, over, senders, received, headings, powered, out):
         senders: SENDER, (env, car), updated.
         received: RECEIVED, (env, receiver, sender), updated.
         headings: Heading by the last state of every car, (env, car) [rad], written.
-        powered: True where the car's tracker runs, (env, car).
+        powered: Mask of the trackers with power, (env, car); only its shape is used.
         out: Events of the cars, (env car, slot), written.
     """
     n_envs, n = powered.shape
@@ -36,7 +35,7 @@ def share_events(block, over, senders, received, headings, powered, out):
     for e in range(n_envs):
         k = 0
         for m in range(over.used[e]):
-            if over.kind[e, m] == MESSAGE:
+            if over.kind[e, m] == RECEIVED_MESSAGE:
                 k = take_states(block, senders, headings, out, e, n, k, over.t[e, m])
                 r, s = over.receiver[e, m], over.i[e, m]
                 receive_motion(senders[e, s], received[e, r, s], over.t[e, m], s, out, e * n + r)

@@ -97,6 +97,7 @@ class OwnPerception:
         self._received: Records = make_received(n_envs, n_cars)
         self._headings = np.zeros((n_envs, n_cars))
         self._now = np.zeros(rows)
+        self._was_powered = np.zeros_like(powered)
         self.rebind(block, powered, overheard)
 
     def part(
@@ -113,6 +114,7 @@ class OwnPerception:
         )
         part._senders, part._received = self._senders[envs], self._received[envs]
         part._headings, part._now = self._headings[envs], self._now[rows]
+        part._was_powered = self._was_powered[envs]
         part.rebind(block, powered, overheard)
         return part
 
@@ -147,10 +149,14 @@ class OwnPerception:
             self._filter.reset(row)
             self.horizon.reset(row)
         self._senders[env], self._received[env] = 0, 0
+        self._was_powered[env] = False
         forget_all(self.view, env)
 
     def step(self) -> None:
         """Process the block and the receptions: update trackers and view."""
+        for env, car in np.argwhere(self._powered & ~self._was_powered).tolist():
+            self._switch_on(env, car)
+        self._was_powered[:] = self._powered
         # A copy: the orientation stage replaces samples by states, in place.
         for target, source in zip(self._states.arrays, self._block.arrays, strict=True):
             np.copyto(target, source)
@@ -165,11 +171,22 @@ class OwnPerception:
         np.copyto(self.view.heading, self._headings, where=self.view.oriented)
         self._note()
 
+    def _switch_on(self, env: int, car: int) -> None:
+        """Reset the tracker of a car and what it received; its sums start again."""
+        row = env * self._powered.shape[1] + car
+        self._filter.reset(row)
+        self.horizon.reset(row)
+        self._received[env, car] = 0
+        self._overheard.last[env, car] = 0
+        self._senders["running"][env, car] = False
+
     def rebind(self, block: MeasurementBlock, powered: Bool, overheard: Overheard) -> None:
         """Bind the kernels to their arrays; arguments as in the constructor."""
         self._block, self._powered, self._overheard = block, powered, overheard
         view, rows = self.view, powered.size
-        slots = block.n_events + 3 * overheard.t.shape[1] // max(powered.shape[1], 1)
+        # Own samples, members, and two states or a range for each reception.
+        n = powered.shape[1]
+        slots = block.n_events // n + 4 * n + 3 * overheard.t.shape[1] // n
         own = MeasurementBlock.empty(rows, slots)
         events = events_of(own)
         due = MeasurementBlock.empty(rows, self._room)

@@ -33,10 +33,10 @@ from relpos_env.world.world_state import WorldState
 from tracking.arrays import F64, Bool
 from tracking.kernels.jit import bind
 from tracking.measurements import MeasurementBlock
-from tracking.ranging.compiled.overheard import Overheard
 from tracking.records import as_records
 
 Physics = Literal["pymunk", "fast"]
+SENSORS = "imu", "mag", "odometer", "proximity"
 SPARE_BOXES = 8
 """[-] Largest number of shapes added to a space that sensors detect."""
 
@@ -68,7 +68,7 @@ class World:
             proximity: Number of distance sensors of each car.
             physics: `pymunk`: the cars move in a space that is kept, see `world`. `fast`: the space
                 is used only for contacts; the motion without contacts is equal, bit for bit.
-            sends_motion: True if ranging messages carry preintegrated motion (`overheard`).
+            sends_motion: Ranging messages carry preintegrated motion.
         """
         self.scenario, self.n_steps = scenario, n_steps
         self.constellation = car_constellation(scenario, n_cars)
@@ -83,8 +83,8 @@ class World:
         """Last readings of the distance sensors, (env, car, sensor) [m]; 0 for absent cars."""
         self._clearance: F64 = np.zeros((e, n))
         radio = scenario.radio.with_motion() if sends_motion else scenario.radio
-        self._sends_motion, overheard = sends_motion, n_steps if sends_motion else 0
-        self._radio = Radio(radio.for_nodes(n), n, [0] * e, DT, overheard_windows=overheard)
+        windows = n_steps if sends_motion else 0
+        self._radio = Radio(radio.for_nodes(n), n, [0] * e, DT, overheard_windows=windows)
         self._scene = Scene(
             np.zeros((e, n, 3)), np.zeros((e, n, 3)), self._bodies.boxes, np.zeros((e, 0, 7))
         )
@@ -120,11 +120,6 @@ class World:
         return self._bodies.contacts
 
     @property
-    def overheard(self) -> Overheard:
-        """What every car knows from its radio since the reader emptied it; shares memory."""
-        return self._radio.overheard
-
-    @property
     def solver_moves(self) -> int:
         """Number of steps made by the rigid-body solver, in all groups together."""
         return int(self._solver.calls["moves"].sum())
@@ -150,10 +145,9 @@ class World:
         part._bodies = Bodies._make(a[envs] for a in self._bodies)
         part._sensors = Sensors._make(a[envs] for a in self._sensors)
         part.odometer, part.proximity = self.odometer[envs], self.proximity[envs]
-        part._clearance = self._clearance[envs]
         part._radio, part._members = self._radio.part(envs), self._members[envs]
         part._scene = Scene._make(a[envs] for a in self._scene)
-        part._groups = self._groups[envs]
+        part._groups, part._clearance = self._groups[envs], self._clearance[envs]
         part._solver = Solver._make(a[envs] for a in self._solver)
         part._next_life, part.to_come = self._next_life[envs], self.to_come[envs]
         part.events, part.t = Events._make(a[envs] for a in self.events), self.t[envs]
@@ -201,8 +195,7 @@ class World:
         Returns:
             Measurements, roughly in order; valid until the next step.
         """
-        self._speed[...] = speed
-        self._steering[...] = steering
+        self._speed[...], self._steering[...] = speed, steering
         for env, group in enumerate(self._groups):
             group.read(self._bodies, env)
         if self._begin_decision():
@@ -246,7 +239,7 @@ class World:
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without the results of `_bind` and the solver with its addresses."""
         bound = {"_begin_decision", "_run_steps", "_read_odometers", "_read_proximity"}
-        bound |= {"_read_clearances", "block", "state", "_solver"}
+        bound |= {"_read_clearances", "block", "overheard", "state", "_solver"}
         return {k: v for k, v in self.__dict__.items() if k not in bound}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -257,14 +250,9 @@ class World:
 
     def _bind(self) -> None:
         """Bind the kernels to their arrays, which stay at the same addresses."""
-        sensors = self._sensors
         bodies = self._bodies._replace(cars=as_records(self._bodies.cars))
-        sensors = sensors._replace(
-            imu=as_records(sensors.imu),
-            mag=as_records(sensors.mag),
-            odometer=as_records(sensors.odometer),
-            proximity=as_records(sensors.proximity),
-        )
+        records = {k: as_records(getattr(self._sensors, k)) for k in SENSORS}
+        sensors = self._sensors._replace(**records)
         self._speed, self._steering = np.zeros_like(self.odometer), np.zeros_like(self.odometer)
         self._waiting = np.zeros(self.n_envs, dtype=np.int64)
         self._begin_decision = bind(
@@ -290,6 +278,8 @@ class World:
             read_clearances, bodies.body, bodies.present, bodies.size, bodies.room, bodies.boxes,
             self._clearance,
         )  # fmt: skip
+        self.overheard = self._radio.overheard
+        """What every car knows from its radio since the reader emptied it; shares memory."""
         self.block = MeasurementBlock(*self.events[:9])
         """Measurements of the last step; shares memory."""
         b = self._bodies

@@ -16,7 +16,10 @@ from relpos_env.formation_v0 import parallel_env
 from relpos_env.scenarios import SCENARIOS
 
 POSES = [[-1.5, 0.0, 0.0], [1.5, 0.0, 3.0], [0.0, -1.5, 1.0]]
-KEYS = {"formation_error", "tracking_error", "tracked", "collisions", "present", "active"}
+KEYS = {
+    "formation_error", "tracking_error", "disagreement", "tracked", "collisions", "present",
+    "active",
+}  # fmt: skip
 
 
 def still(env):

@@ -46,9 +46,6 @@ def equal(a, b, envs=slice(None)):
 def test_an_environment_of_a_batch_is_that_environment_alone():
     batch = run(core_of(3), 0, 30)
     alone = core_of(1)
-    alone.seed(0, np.random.default_rng(40))
-    alone.begin([0])
-    alone = core_of(1)
     seen = []
     for k in range(30):
         speed, steering = actions(3, 3, k)
@@ -66,14 +63,37 @@ def test_threads_and_copies_change_nothing():
     assert equal(run(copy, 10, 15), whole[10:])
 
 
-def test_a_reset_of_one_environment_leaves_the_others():
+def test_a_reset_forgets_everything_of_its_environment_and_nothing_of_the_others():
     core, other = core_of(2), core_of(2)
     run(core, 0, 10), run(other, 0, 10)
+    other.seed(0, np.random.default_rng(40))
     other.begin([0])
-    a, b = run(core, 10, 10), run(other, 10, 10)
+    a, b, fresh = run(core, 10, 10), run(other, 10, 10), run(core_of(2), 10, 10)
     assert all(np.array_equal(x[0][1], y[0][1]) for x, y in zip(a, b, strict=True))
-    fresh = core_of(2)
-    assert not np.array_equal(other.observations[0], fresh.observations[0])
+    assert all(np.array_equal(x[0][0], y[0][0]) for x, y in zip(b, fresh, strict=True))
+
+
+def test_a_car_that_was_off_knows_nothing_of_before():
+    """Its tracker begins again, and the others do not continue its sums."""
+    core = core_of(1)
+    run(core, 0, 20)
+    assert core.loop.view.ok[0, 0, 1:].all()
+    world, epoch = core.loop.swarm, int(core.loop.perception._senders["epoch"][0, 0])
+    world.powered[0, 0] = False
+    world._radio.switch_off(0, 0)
+    run(core, 20, 2)
+    assert not core.loop.view.ok[0, 0].any()
+    world.powered[0, 0] = True
+    world._radio.switch_on(0, 0, boot=9)
+    run(core, 22, 1)
+    assert not core.loop.view.ok[0, 0].any()
+    run(core, 23, 1)
+    assert int(core.loop.perception._senders["epoch"][0, 0]) == epoch + 1
+    driver = LoopDrivers(scenario("cars-nlos"), np.random.default_rng(0), 3)
+    for _ in range(120):
+        command = driver.command(core.state.take(0))
+        core.step(command.speed[None], command.steering[None])
+    assert core.loop.view.ok[0, 0, 1:].all()
 
 
 def test_estimates_of_each_car_are_its_own():

@@ -44,6 +44,17 @@ def true_time(node, ticks):
 
 
 @small_kernel
+def distance_moved(scene, k):
+    """Return the distance that an antenna moves in the window [m]."""
+    x, y, z = (
+        scene.pos1[k, 0] - scene.pos0[k, 0],
+        scene.pos1[k, 1] - scene.pos0[k, 1],
+        scene.pos1[k, 2] - scene.pos0[k, 2],
+    )
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@small_kernel
 def enter_next_window(node, seed, window, k, dt, wander):
     """Advance clock, clock rate and distance travelled of a node to the next window.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from relpos_env.sensors.radio._path_kernels import (
+    distance_moved,
     enter_next_window,
     read_clock,
     receive,
@@ -166,17 +166,6 @@ def power_nodes(p, batch, e, k, on, boot, t):
 
 
 @small_kernel
-def distance_moved(scene, k):
-    """Return the distance that an antenna moves in the window [m]."""
-    x, y, z = (
-        scene.pos1[k, 0] - scene.pos0[k, 0],
-        scene.pos1[k, 1] - scene.pos0[k, 1],
-        scene.pos1[k, 2] - scene.pos0[k, 2],
-    )
-    return math.sqrt(x * x + y * y + z * z)
-
-
-@small_kernel
 def plan(air, k):
     """Update the due time of a node's deadline."""
     node = air.nodes[k]
@@ -262,7 +251,8 @@ def end_message(p, radio, c, seed, air, scene, s, t, dt, out, over, start, e):
             if distance > 0.0:
                 note_range(air, r, s, distance, time, rx, out, e)
             if overhears and session.received_at == session.now:
-                note_message(over, e, r, s, air.nodes[s].sent, start + air.flights[s].moment)
+                has_table, moment = air.messages[s].rows > 0, start + air.flights[s].moment
+                note_message(over, e, r, s, air.nodes[s].sent, has_table, moment)
                 if distance > 0.0:
                     at = start + true_time(air.nodes[r], time)
                     note_resolved(

@@ -125,8 +125,9 @@ class Radio:
         pairs = n * (n - 1) // 2
         self.room = room = pairs * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
         """Largest number of ranges in a window."""
-        messages = n * (2 + int(np.ceil(dt * round_rate(phy, max(n, 2)))))
-        self.overheard = make_overheard(e, n, overheard_windows * (messages * (n - 1) + n * room))
+        # Messages follow each other on the air; each may complete ranges with all other nodes.
+        messages = 2 + int(np.ceil(dt * n * round_rate(phy, max(n, 2))))
+        self.overheard = make_overheard(e, n, overheard_windows * messages * n * n)
         """What every node knows from its radio since the reader set `used` to 0."""
         for k, seed in enumerate(seeds):
             self.reset(k, seed)

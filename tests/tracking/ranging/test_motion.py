@@ -42,8 +42,9 @@ MOTIONS = st.builds(
     age=st.integers(0, 65535),
     velocity=st.tuples(*[counts(24)] * 3),
     position=st.tuples(*[counts(16)] * 3),
-    rotation=st.tuples(st.integers(0, 3), *[st.integers(-13000, 13000)] * 3),
+    rotation=st.tuples(st.integers(0, 3), *[st.integers(-11500, 11500)] * 3),
     noise=st.integers(0, 255),
+    epoch=st.integers(0, 1),
 )
 
 
@@ -56,7 +57,7 @@ def test_motions_round_trip(motion):
 
 
 @quick
-@given(st.binary(max_size=30))
+@given(st.binary(min_size=24, max_size=24) | st.binary(max_size=30))
 def test_any_bytes_decode_or_name_the_error(data):
     try:
         motion = decode_motion(data)
@@ -176,6 +177,15 @@ def test_noise_of_a_sample_reaches_the_receiver():
     t, a, q = drive(1)
     _, values = states_at_receiver(t, a, q, np.arange(0.05, 7.9, 0.02), noise=3.0)
     assert np.all(values[:, ACCEL_NOISE] >= 3.0)
+
+
+def test_one_noisy_sample_is_forgotten_after_a_second():
+    t, a, q = drive(1)
+    noise = np.where(np.arange(len(t)) == 300, 3.0, 0.0)
+    found_t, values = states_at_receiver(t, a, q, np.arange(0.05, 7.9, 0.02), noise=noise)
+    noisy = values[:, ACCEL_NOISE] > 0.0
+    assert noisy[(found_t > 3.02) & (found_t < 3.9)].all()
+    assert not noisy[(found_t < 2.95) | (found_t > 4.1)].any()
 
 
 def test_orientations_are_those_between_the_messages():

@@ -34,6 +34,8 @@ SHORT = 0.06
 """[s] Interval up to which one mean acceleration is used."""
 LONGEST = 1.0
 """[s] Interval above which the motion between two messages is not used."""
+FASTEST = 2000.0
+"""[m/s] Sum above which the sums start again: p can be unwrapped only while v does not wrap."""
 GAP = 0.3
 """[s] Time without a state after which the sums of the sender start again: a new epoch."""
 STATE = 3
@@ -43,11 +45,11 @@ SENDER = np.dtype(
     [("running", "?"), ("epoch", "i8"), ("t", "f8"), ("t_before", "f8")]
     + [(f"{name}{k}", "f8") for name in ("v", "p", "a", "vb", "pb") for k in range(3)]
     + [(f"{name}{k}", "f8") for name in ("q", "qb") for k in range(4)]
-    + [("noise", "f8")]
+    + [("noise", "f8"), ("t_noise", "f8")]
 )
 """Sums of a node: number of the epoch; time of the last STATE and of the one before [s]; sums v,
 p [m/s, m] and acceleration a [m/s2] at the last one; sums vb, pb at the one before; orientations;
-largest added noise density since the last message [m/s2/sqrt(Hz)]."""
+largest added noise density of the last second [m/s2/sqrt(Hz)], and its time [s]."""
 
 RECEIVED = np.dtype(
     [("known", "?"), ("epoch", "i8"), ("t", "f8")]
@@ -132,10 +134,10 @@ def rotation_of(largest, i, j, k):
 def integrate_state(s, t, values, e, k):
     """Add a STATE event in column k to the sums of its node."""
     dt = t - s.t
-    if s.running and dt > GAP:
+    if s.running and (dt > GAP or max(abs(s.v0), abs(s.v1), abs(s.v2)) > FASTEST):
         s.running = False
     if not s.running:
-        s.running, s.epoch = True, s.epoch + 1
+        s.running, s.epoch, s.noise, s.t_noise = True, s.epoch + 1, 0.0, t
         s.v0 = s.v1 = s.v2 = s.p0 = s.p1 = s.p2 = dt = 0.0
         s.q0, s.q1, s.q2, s.q3 = (
             values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3],
@@ -154,7 +156,9 @@ def integrate_state(s, t, values, e, k):
     s.t = t
     s.q0, s.q1, s.q2, s.q3 = values[e, k, 0], values[e, k, 1], values[e, k, 2], values[e, k, 3]
     s.a0, s.a1, s.a2 = a0, a1, a2
-    s.noise = max(s.noise, values[e, k, ACCEL_NOISE])
+    noise = values[e, k, ACCEL_NOISE]
+    if noise >= s.noise or t - s.t_noise > LONGEST:
+        s.noise, s.t_noise = noise, t
 
 
 @small_kernel
@@ -163,7 +167,7 @@ def receive_motion(s, r, sent, node, out, e):
 
     Args:
         s: SENDER of the node; its sums are those at the last state before the message, or one
-            state later.
+            state later. A message that is longer than this passes without a motion.
         r: RECEIVED of the node at the receiver, updated.
         sent: Time of the message [s].
         node: Index of the node.
@@ -189,7 +193,7 @@ def receive_motion(s, r, sent, node, out, e):
     )
     q0, q1, q2, q3 = rotation_counts(qw, qx, qy, qz)
     noise = noise_density(noise_byte(s.noise))
-    if r.known and r.epoch == s.epoch and 0.0 < t - r.t <= LONGEST:
+    if r.known and (r.epoch ^ s.epoch) & 1 == 0 and 0.0 < t - r.t <= LONGEST:
         dt = t - r.t
         ax, bx = mean_accelerations(r.v0, r.p0, v0, p0, dt)
         ay, by = mean_accelerations(r.v1, r.p1, v1, p1, dt)

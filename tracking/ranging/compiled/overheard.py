@@ -15,8 +15,8 @@ import numpy as np
 from tracking.arrays import F64, I64
 from tracking.kernels.jit import small_kernel
 
-RANGE, MESSAGE = 5, -1
-"""Kinds of events; `MESSAGE`: a received message."""
+RANGE, RECEIVED_MESSAGE = 5, -1
+"""Kinds of events; `RECEIVED_MESSAGE`: a received message."""
 POWER_TOP, POWER_STEP, MOST_STEPS, MOST_GAP = -60.0, 3.0, 14, 15
 """Steps of the powers in a table [dBm, dB], see `tracking.ranging.frames.wire`."""
 
@@ -31,7 +31,7 @@ class Overheard(NamedTuple):
     t: F64
     """Time of the range, or of the received message [s]."""
     kind: I64
-    """`Kind.RANGE`, or `MESSAGE` for a received message."""
+    """`Kind.RANGE`, or `RECEIVED_MESSAGE` for a received message."""
     receiver: I64
     i: I64
     """The node with the smaller number, or the sender of the message."""
@@ -76,7 +76,7 @@ def note_resolved(over, e, i, j, question, answer, t, distance, rx_power, fp_pow
 
 
 @small_kernel
-def note_message(over, e, receiver, sender, number, t):
+def note_message(over, e, receiver, sender, number, has_table, t):
     """Record a received message, and the ranges of its sender that it completes.
 
     Args:
@@ -84,12 +84,14 @@ def note_message(over, e, receiver, sender, number, t):
         e: Index of the environment.
         receiver: Node that received it.
         sender: Node that sent it.
-        number: Number of the message at its sender.
+        number: Number of the message at its sender, from 1.
+        has_table: True if the message has a table, and so a motion.
         t: Time of its stamp [s].
     """
-    append(over, e, MESSAGE, receiver, sender, sender, t, 0.0, 0.0, 0.0)
     last = over.last
-    if last[e, receiver, sender] == number - 1:
+    if has_table:
+        append(over, e, RECEIVED_MESSAGE, receiver, sender, sender, t, 0.0, 0.0, 0.0)
+    if has_table and number > 1 and last[e, receiver, sender] == number - 1:
         for j in range(sender + 1, last.shape[1]):
             if over.question[e, sender, j] != number - 1:
                 continue

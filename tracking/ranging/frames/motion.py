@@ -14,7 +14,8 @@ since the orientation is known). Rounding errors do not add up for the same reas
     2      age of the sums             10 us, before the time stamp of the message
     3 x 3  v, x y z                    1/4096 m/s, modulo 4096 m/s
     3 x 2  p, x y z                    1/8192 m, modulo 8 m
-    6      orientation, body to world  2 bits: the largest of w x y z, which is positive; 15 bits
+    6      epoch                       1 bit, changes whenever the sums start again
+           orientation, body to world  2 bits: the largest of w x y z, which is positive; 15 bits
                                        each of the others, in this order, in 2^-14.5
     1      added noise of acceleration 0 none, else 2^((k - 128) / 8) m/s2/sqrt(Hz)
 
@@ -52,12 +53,14 @@ class Motion:
     rotation: tuple[int, int, int, int]
     """Index of the largest component of the quaternion, and the other three."""
     noise: int
+    epoch: int = 0
+    """Bit that changes whenever the sums start again."""
 
 
 def encode_motion(motion: Motion) -> bytes:
     """Return the bytes of a motion."""
     velocity = b"".join(v.to_bytes(3, "little", signed=True) for v in motion.velocity)
-    packed = motion.rotation[0]
+    packed = motion.epoch << 2 | motion.rotation[0]
     for count in motion.rotation[1:]:
         packed = packed << 15 | count & 0x7FFF
     rotation = packed.to_bytes(6, "little")
@@ -76,6 +79,8 @@ def decode_motion(data: bytes) -> Motion:
     v = [int.from_bytes(velocity[k : k + 3], "little", signed=True) for k in (0, 3, 6)]
     packed = int.from_bytes(rotation, "little")
     x, y, z = ((packed >> shift & 0x7FFF ^ 0x4000) - 0x4000 for shift in (30, 15, 0))
-    if packed >> 47 or math.hypot(x, y, z) * ROTATION_UNIT > 0.5**0.5 * 3**0.5:
+    if math.hypot(x, y, z) * ROTATION_UNIT > 0.75**0.5 + 4.0 * ROTATION_UNIT:
         raise WireError("motion: expected an orientation, its quaternion is too long")
-    return Motion(age, (v[0], v[1], v[2]), (px, py, pz), (packed >> 45, x, y, z), noise)
+    return Motion(
+        age, (v[0], v[1], v[2]), (px, py, pz), (packed >> 45 & 3, x, y, z), noise, packed >> 47
+    )
