@@ -19,7 +19,7 @@ from tracking.filters.joint.supervision.params import AlignmentParams
 from tracking.filters.level_vehicle import angle_between, direction
 from tracking.geometry import quat_from_yaw
 from tracking.maths import covariance_loops as loops
-from tracking.maths import covariance_simd as simd
+from tracking.maths import vectors
 from tracking.maths.covariance import (
     ROOM,
     STATES,
@@ -222,7 +222,7 @@ def test_a_step_is_a_product_with_its_derivatives(n, p, shape):
 @pytest.mark.parametrize("add", [add_to_rows, add_to_columns])
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
-    monkeypatch.setattr(simd, "LANES", lanes)
+    monkeypatch.setattr(vectors, "LANES", lanes)
     fresh = njit(add.py_func)  # not cached
     plainly = loops.add_to_rows if add is add_to_rows else loops.add_to_columns
     for shape in SHAPES:
@@ -235,7 +235,7 @@ def test_a_step_in_registers_of_any_width_is_the_same(monkeypatch, lanes, add):
 @pytest.mark.skipif(not USES_SIMD, reason="plain loops only")
 @pytest.mark.parametrize("lanes", [2, 4, 8])
 def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
-    monkeypatch.setattr(simd, "LANES", lanes)
+    monkeypatch.setattr(vectors, "LANES", lanes)
     fresh = njit(apply_downdate.py_func)  # not cached
     rng = np.random.default_rng(lanes)
     for n in (8, 40):
@@ -246,6 +246,13 @@ def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
         loops.apply_downdate(twin, 0, W, 0, 7, None)
         np.testing.assert_allclose(P, twin, atol=1e-10)
         np.testing.assert_array_equal(P[0], P[0].T)
+    fresh = njit(mirror.py_func)
+    for rows in (16, 27):
+        P = rng.standard_normal((1, 40, 40))
+        twin = P.copy()
+        fresh(P, 0, rows)
+        loops.mirror(twin, 0, rows)
+        np.testing.assert_array_equal(P, twin)
     fresh = njit(sum_rows.py_func)
     for n in (24, 56):
         arguments, summed = rows_to_sum(n, 8, 5, n), np.zeros(n)

@@ -29,7 +29,8 @@ from numba import config
 from tracking.kernels.jit import kernel, small_kernel
 from tracking.maths import covariance_loops as loops
 from tracking.maths import covariance_simd as simd
-from tracking.maths.covariance_loops import ROOM, STATES, mirror
+from tracking.maths import vectors
+from tracking.maths.covariance_loops import ROOM, STATES
 
 USES_SIMD = os.environ.get("RELPOS_SIMD", "1") != "0" and not config.DISABLE_JIT
 """True if SIMD is used for matrices of a suitable size."""
@@ -45,7 +46,7 @@ def _sum_rows(P, h, idx, val, m, W, share, q, w):
 
 @kernel
 def _add_to_rows(P, h, p, b, m, F, i):
-    if P.shape[2] % simd.LANES:
+    if P.shape[2] % vectors.LANES:
         loops.add_to_rows(P, h, p, b, m, F, i)
     else:
         simd.add_to_rows(P, h, p, b, m, F, i)
@@ -53,7 +54,7 @@ def _add_to_rows(P, h, p, b, m, F, i):
 
 @kernel
 def _add_to_columns(P, h, p, b, m, F, i):
-    if P.shape[2] % simd.LANES:
+    if P.shape[2] % vectors.LANES:
         loops.add_to_columns(P, h, p, b, m, F, i)
     else:
         simd.add_to_columns(P, h, p, b, m, F, i)
@@ -61,16 +62,24 @@ def _add_to_columns(P, h, p, b, m, F, i):
 
 @kernel
 def _apply_downdate(P, h, W, g, m, scale):
-    if P.shape[2] % simd.LANES:
+    if P.shape[2] % vectors.LANES:
         loops.apply_downdate(P, h, W, g, m, scale)
     else:
         simd.apply_downdate(P, h, W, g, m, scale)
+
+
+@kernel
+def _mirror(P, h, rows):
+    whole = 0 if P.shape[2] % vectors.LANES else rows - rows % vectors.LANES
+    simd.mirror(P, h, whole)
+    loops.mirror(P, h, rows, whole)
 
 
 sum_rows = _sum_rows if USES_SIMD else loops.sum_rows
 add_to_rows = _add_to_rows if USES_SIMD else loops.add_to_rows
 add_to_columns = _add_to_columns if USES_SIMD else loops.add_to_columns
 apply_downdate = _apply_downdate if USES_SIMD else loops.apply_downdate
+mirror = _mirror if USES_SIMD else loops.mirror
 
 __all__ = [
     "ROOM",

@@ -78,8 +78,8 @@ def apply_downdate(P, h, W, g, m, scale):
 
 
 @kernel
-def mirror(P, h, rows):
-    """Copy the upper triangle of the first rows of ``P[h]`` to the lower triangle."""
-    for r in range(rows):
+def mirror(P, h, rows, first=0):
+    """Copy the upper triangle of ``P[h, first:rows]`` to the lower triangle."""
+    for r in range(first, rows):
         for k in range(r + 1, P.shape[2]):
             P[h, k, r] = P[h, r, k]

@@ -12,76 +12,27 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from tracking.kernels.processors import has_wide_registers
+from tracking.maths import vectors
 from tracking.maths.covariance_loops import STATES
+from tracking.maths.vectors import (
+    INT,
+    load,
+    matrix_at,
+    row_at,
+    spread,
+    store,
+    store_transposed,
+    transpose,
+    vector,
+)
 
-LANES = 8 if has_wide_registers() else 4
-"""Number of elements of a vector."""
 LONG, SHORT = 48, 16
 """Elements of a row that are summed at a time: as many as registers hold, or few in short rows."""
 WIDE = 2
 """Vectors side by side in a block of P: enough sums at a time to hide the latency of each."""
 SHAPES = ((2, 3), (3, 4), (3, 7))
 """Dimensions, and states after position and velocity: the plane, space, space with an offset."""
-DOUBLE, INT = ir.DoubleType(), ir.IntType(64)
 CONTRACT = ("contract",)  # allows fused multiply-add
-
-
-def vector():
-    """Return the type of a vector."""
-    return ir.VectorType(DOUBLE, LANES)
-
-
-def _places(numbers):
-    """Return the mask that shuffles elements of two vectors into a third."""
-    return ir.Constant(ir.VectorType(ir.IntType(32), LANES), numbers)
-
-
-def matrix_at(target, builder, kind, array, index):
-    """Return the address of a matrix of an array, and the length of its rows."""
-    a = target.make_array(kind)(target, builder, array)
-    _, height, width = cgutils.unpack_tuple(builder, a.shape)
-    at = builder.mul(index, builder.mul(height, width))
-    return builder.gep(a.data, [at]), width
-
-
-def row_at(builder, matrix, row, below, length):
-    """Return the address of the row that is `below` rows after another."""
-    return builder.gep(matrix, [builder.mul(builder.add(row, INT(below)), length)])
-
-
-def load(builder, row, at):
-    """Load a vector from an address that need not be aligned."""
-    address = builder.bitcast(builder.gep(row, [at]), vector().as_pointer())
-    return builder.load(address, align=8)
-
-
-def store(builder, numbers, row, at):
-    """Store a vector at an address that need not be aligned."""
-    address = builder.bitcast(builder.gep(row, [at]), vector().as_pointer())
-    builder.store(numbers, address, align=8)
-
-
-def spread(builder, row, at):
-    """Broadcast one element of a row to a vector."""
-    nothing = ir.Constant(vector(), ir.Undefined)
-    first = builder.insert_element(nothing, builder.load(builder.gep(row, [at])), INT(0))
-    return builder.shuffle_vector(first, nothing, _places([0] * LANES))
-
-
-def transpose(builder, block):
-    """Transpose a block of LANES vectors: exchange halves, then halves of halves."""
-    block, half = list(block), LANES // 2
-    while half:
-        for i in range(LANES):
-            if not i & half:
-                upper, lower = block[i], block[i + half]
-                left = [LANES + k - half if k & half else k for k in range(LANES)]
-                right = [LANES + k if k & half else k + half for k in range(LANES)]
-                block[i] = builder.shuffle_vector(upper, lower, _places(left))
-                block[i + half] = builder.shuffle_vector(upper, lower, _places(right))
-        half //= 2
-    return block
 
 
 @intrinsic
@@ -97,12 +48,12 @@ def sum_rows(context, P, h, idx, val, m, W, share, q, w):
             target.make_array(kinds[k])(target, builder, array).data
             for k, array in ((2, idx), (3, val), (6, share), (8, w))
         )
-        nothing = vector()([0.0] * LANES)
-        sums = [cgutils.alloca_once(builder, vector()) for _ in range(LONG // LANES)]
+        nothing = vector()([0.0] * vectors.LANES)
+        sums = [cgutils.alloca_once(builder, vector()) for _ in range(LONG // vectors.LANES)]
 
         def stretch(column, totals):
             """Sum one stretch of all rows."""
-            at = [builder.add(column, INT(LANES * j)) for j in range(len(totals))]
+            at = [builder.add(column, INT(vectors.LANES * j)) for j in range(len(totals))]
             for total in totals:
                 builder.store(nothing, total)
             with cgutils.for_range(builder, m, intp=INT) as k:
@@ -127,7 +78,7 @@ def sum_rows(context, P, h, idx, val, m, W, share, q, w):
             last, step = builder.sub(n, INT(length)), INT(length)
             with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (column, _):
                 beyond = builder.icmp_signed(">", column, last)
-                stretch(builder.select(beyond, last, column), sums[: length // LANES])
+                stretch(builder.select(beyond, last, column), sums[: length // vectors.LANES])
 
         with builder.if_else(builder.icmp_signed(">=", n, INT(LONG))) as (then, otherwise):
             with then:
@@ -174,7 +125,7 @@ def add_to_rows(context, P, h, p, b, m, F, i):
             time = gain(STATES, 0)
             each = [[q for q in range(m) if _counts(d, m, r, q)] for r in range(2 * d)]
             weights = [{q: gain(q, r) for q in each[r]} for r in range(2 * d)]
-            step = INT(LANES)
+            step = INT(vectors.LANES)
             with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (column, _):
                 own = [row_at(builder, states, p, r, n) for r in range(2 * d)]
                 behind = [row_at(builder, states, b, q, n) for q in range(m)]
@@ -203,7 +154,7 @@ def add_to_columns(context, P, h, p, b, m, F, i):
         gains, room = matrix_at(target, builder, signature.args[5], F, i)
 
         def add(d, m):
-            parts = range(0, 2 * d, LANES)
+            parts = range(0, 2 * d, vectors.LANES)
             lines = [row_at(builder, gains, INT(q), 0, room) for q in range(STATES + 1)]
             weights = [[load(builder, line, INT(at)) for at in parts] for line in lines]
             end = builder.add(p, INT(2 * d))
@@ -239,27 +190,30 @@ def apply_downdate(context, P, h, W, g, m, scale):
         rows, _ = matrix_at(target, builder, signature.args[2], W, g)
         if fades:
             scale = target.make_array(signature.args[5])(target, builder, scale).data
-        sums = [[cgutils.alloca_once(builder, vector()) for _ in range(WIDE)] for _ in range(LANES)]
+        lanes = range(vectors.LANES)
+        sums = [[cgutils.alloca_once(builder, vector()) for _ in range(WIDE)] for _ in lanes]
 
         def square(row, column, wide):
             """Downdate `wide` vectors of LANES rows of P; copy the result to the other half."""
-            own = [row_at(builder, states, row, i, n) for i in range(LANES)]
-            columns = [builder.add(column, INT(LANES * j)) for j in range(wide)]
-            each = [(i, j) for i in range(LANES) for j in range(wide)]
+            own = [row_at(builder, states, row, i, n) for i in lanes]
+            columns = [builder.add(column, INT(vectors.LANES * j)) for j in range(wide)]
+            each = [(i, j) for i in lanes for j in range(wide)]
             for i, j in each:
                 builder.store(load(builder, own[i], columns[j]), sums[i][j])
             with cgutils.for_range(builder, m, intp=INT) as q:
                 w = row_at(builder, rows, q.index, 0, n)
                 right = [load(builder, w, at) for at in columns]
-                left = [spread(builder, w, builder.add(row, INT(i))) for i in range(LANES)]
+                left = [spread(builder, w, builder.add(row, INT(i))) for i in lanes]
                 for i, j in each:
                     product = builder.fmul(left[i], right[j], flags=CONTRACT)
                     total = builder.fsub(builder.load(sums[i][j]), product, flags=CONTRACT)
                     builder.store(total, sums[i][j])
             if fades:
-                keep = [spread(builder, scale, builder.add(row, INT(i))) for i in range(LANES)]
+                keep = [
+                    spread(builder, scale, builder.add(row, INT(i))) for i in range(vectors.LANES)
+                ]
             for j, at in enumerate(columns):
-                block = [builder.load(sums[i][j]) for i in range(LANES)]
+                block = [builder.load(sums[i][j]) for i in lanes]
                 if fades:
                     # The product of both factors first, so that both halves are rounded alike.
                     both = load(builder, scale, at)
@@ -269,10 +223,9 @@ def apply_downdate(context, P, h, W, g, m, scale):
                     ]
                 for i, numbers in enumerate(block):
                     store(builder, numbers, own[i], at)
-                for i, numbers in enumerate(transpose(builder, block)):
-                    store(builder, numbers, row_at(builder, states, at, i, n), row)
+                store_transposed(builder, block, states, at, n, row)
 
-        step, width = INT(LANES), INT(LANES * WIDE)
+        step, width = INT(vectors.LANES), INT(vectors.LANES * WIDE)
         with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (row, _):
             whole = builder.sub(n, builder.srem(builder.sub(n, row), width))
             with cgutils.for_range_slice(builder, row, whole, width, intp=INT) as (column, _):
@@ -282,3 +235,27 @@ def apply_downdate(context, P, h, W, g, m, scale):
         return target.get_dummy_value()
 
     return types.void(P, h, W, g, m, scale), generate
+
+
+@intrinsic
+def mirror(context, P, h, rows):
+    """Generate the code of `mirror` for whole blocks of rows."""
+
+    def generate(target, builder, signature, arguments):
+        P, h, rows = arguments
+        states, n = matrix_at(target, builder, signature.args[0], P, h)
+        step, lanes = INT(vectors.LANES), range(vectors.LANES)
+        flags = ir.VectorType(ir.IntType(1), vectors.LANES)
+        with cgutils.for_range_slice(builder, INT(0), rows, step, intp=INT) as (row, _):
+            own = [row_at(builder, states, row, i, n) for i in lanes]
+            block = [load(builder, one, row) for one in own]
+            for i, numbers in enumerate(transpose(builder, block)):
+                below = ir.Constant(flags, [k < i for k in lanes])
+                store(builder, builder.select(below, numbers, block[i]), own[i], row)
+            right = builder.add(row, step)
+            with cgutils.for_range_slice(builder, right, n, step, intp=INT) as (column, _):
+                block = [load(builder, one, column) for one in own]
+                store_transposed(builder, block, states, column, n, row)
+        return target.get_dummy_value()
+
+    return types.void(P, h, rows), generate

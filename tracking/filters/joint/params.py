@@ -124,7 +124,7 @@ class JointStartParams:
     """[rad] Standard deviation of the first rotation in space; larger: it is corrected more."""
     spare_hypotheses: int = 8
     """[-] Places of the bank in the plane beyond its rotations; larger: more second sides fit."""
-    modes_3d: int = 9
+    modes_3d: int = 7
     """[-] Places of the bank in space; larger: more modes of the rotation can be followed."""
     first_powers_most: float = 7.0
     """[-] Largest log-likelihood ratio from a pair's first powers; larger: they can count more."""
