@@ -28,6 +28,7 @@ from tracking.maths.covariance import (
     add_to_rows,
     apply_downdate,
     mirror,
+    subtract_square,
     sum_rows,
 )
 from tracking.maths.covariance_simd import SHAPES
@@ -154,6 +155,17 @@ def test_what_is_taken_off_is_the_product(n, m, fades):
     np.testing.assert_array_equal(W, rows)
 
 
+@pytest.mark.parametrize("n", [3, 8, 20, 40, 48])
+def test_a_square_is_subtracted_exactly_as_in_loops(n):
+    rng = np.random.default_rng(n)
+    P, w = rng.standard_normal((2, n, n)), rng.standard_normal(n)
+    before, twin = P.copy(), P.copy()
+    subtract_square(P, 1, w)
+    loops.subtract_square(twin, 1, w)
+    np.testing.assert_array_equal(P, twin)
+    np.testing.assert_allclose(P[1], before[1] - np.outer(w, w), atol=1e-14)
+
+
 def rows_to_sum(n, m, q, seed):
     """Return arguments of `sum_rows`: random matrices, rows and weights, and an output."""
     rng = np.random.default_rng(seed)
@@ -253,6 +265,10 @@ def test_registers_of_any_width_give_the_same(monkeypatch, lanes):
         fresh(P, 0, rows)
         loops.mirror(twin, 0, rows)
         np.testing.assert_array_equal(P, twin)
+    w = rng.standard_normal(40)
+    njit(subtract_square.py_func)(P, 0, w)
+    loops.subtract_square(twin, 0, w)
+    np.testing.assert_array_equal(P, twin)
     fresh = njit(sum_rows.py_func)
     for n in (24, 56):
         arguments, summed = rows_to_sum(n, 8, 5, n), np.zeros(n)

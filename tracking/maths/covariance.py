@@ -14,6 +14,7 @@ environment, before the package is imported, to use plain loops.
         Add to the columns with the same gains, down to the last row of the velocity.
     apply_downdate(P, h, W, g, m, scale)                        P[h] <- D (P - W^T W) D
         W is m rows of W[g]; the result is exactly symmetric; D = diag(scale), or 1 for None.
+    subtract_square(P, h, w)                                    P[h] <- P - w w^T
     mirror(P, h, rows)
         Copy the upper triangle of the first rows of P[h] to the lower triangle.
 
@@ -68,6 +69,14 @@ def _apply_downdate(P, h, W, g, m, scale):
         simd.apply_downdate(P, h, W, g, m, scale)
 
 
+@small_kernel
+def _subtract_square(P, h, w):
+    if P.shape[2] % vectors.LANES:
+        loops.subtract_square(P, h, w)
+    else:
+        simd.subtract_square(P, h, w)
+
+
 @kernel
 def _mirror(P, h, rows):
     whole = 0 if P.shape[2] % vectors.LANES else rows - rows % vectors.LANES
@@ -79,6 +88,7 @@ sum_rows = _sum_rows if USES_SIMD else loops.sum_rows
 add_to_rows = _add_to_rows if USES_SIMD else loops.add_to_rows
 add_to_columns = _add_to_columns if USES_SIMD else loops.add_to_columns
 apply_downdate = _apply_downdate if USES_SIMD else loops.apply_downdate
+subtract_square = _subtract_square if USES_SIMD else loops.subtract_square
 mirror = _mirror if USES_SIMD else loops.mirror
 
 __all__ = [
@@ -89,5 +99,6 @@ __all__ = [
     "add_to_rows",
     "apply_downdate",
     "mirror",
+    "subtract_square",
     "sum_rows",
 ]

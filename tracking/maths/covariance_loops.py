@@ -83,3 +83,10 @@ def mirror(P, h, rows, first=0):
     for r in range(first, rows):
         for k in range(r + 1, P.shape[2]):
             P[h, k, r] = P[h, r, k]
+
+
+@kernel
+def subtract_square(P, h, w):
+    """Subtract ``w w^T`` from P[h]."""
+    for r in range(P.shape[2]):
+        add_row(P[h, r], -w[r], w)

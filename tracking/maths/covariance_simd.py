@@ -259,3 +259,24 @@ def mirror(context, P, h, rows):
         return target.get_dummy_value()
 
     return types.void(P, h, rows), generate
+
+
+@intrinsic
+def subtract_square(context, P, h, w):
+    """Generate the code of `subtract_square` for whole blocks."""
+
+    def generate(target, builder, signature, arguments):
+        P, h, w = arguments
+        states, n = matrix_at(target, builder, signature.args[0], P, h)
+        w, step = target.make_array(signature.args[2])(target, builder, w).data, INT(vectors.LANES)
+        with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (row, _):
+            own = [row_at(builder, states, row, i, n) for i in range(vectors.LANES)]
+            left = [spread(builder, w, builder.add(row, INT(i))) for i in range(vectors.LANES)]
+            with cgutils.for_range_slice(builder, INT(0), n, step, intp=INT) as (column, _):
+                right = load(builder, w, column)
+                for line, one in zip(own, left, strict=True):
+                    total = builder.fsub(load(builder, line, column), builder.fmul(one, right))
+                    store(builder, total, line, column)
+        return target.get_dummy_value()
+
+    return types.void(P, h, w), generate

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from tracking.kernels.jit import small_kernel
-from tracking.maths.covariance import apply_downdate, sum_rows
+from tracking.maths.covariance import apply_downdate, subtract_square, sum_rows
 
 
 @small_kernel
@@ -124,10 +124,7 @@ def kalman_update(s, h, w, nu, S):
         x[h, r] += w[r] * gain
         moved[h, r] += w[r] * gain
         w[r] *= scale
-    for r in range(n):
-        w_r = w[r]
-        for c in range(n):
-            P[h, r, c] -= w_r * w[c]
+    subtract_square(P, h, w)
 
 
 @small_kernel
