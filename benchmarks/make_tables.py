@@ -285,8 +285,7 @@ def second_world() -> str:
     head = ("", "worlds", "rmse_yaw / shape", "over the bound", "NEES", "`ok`", "`ok` and wrong",
             "`ok` and within its accuracy")  # fmt: skip
     rows = []
-    for line in (MEASURED / "second-world.jsonl").read_text().splitlines():
-        r = json.loads(line)
+    for r in measured("second-world"):
         rows.append([
             r["kind"], f"{r['worlds']}", f"{r['yaw']:.3f} / {r['shape']:.3f}",
             f"{r['yaw_ratio']:.2f} / {r['shape_ratio']:.2f}", f"{r['nees']:.2f}",
@@ -300,8 +299,7 @@ def time_to_ok() -> str:
     """Return the table of the times until pairs are ok."""
     head = ("runs of", "an efficient estimator [s]", "`ok` [s]", "within twice", "never `ok`")
     rows = []
-    for line in (MEASURED / "time-to-ok.jsonl").read_text().splitlines():
-        r = json.loads(line)
+    for r in measured("time-to-ok"):
         rows.append([
             r["kind"], f"{r['needed_s']:.1f}", f"{r['ok_s']:.1f}",
             f"{100.0 * r['within_twice']:.0f} %", f"{r['never']}/{r['sufficient']}",
@@ -314,8 +312,7 @@ def own_trackers() -> str:
     head = ("loss", "trackers", "error [m]", "ratio", "`ok`", "`ok` and wrong by 0.5 m",
             "disagreement [m]", "ranges of a pair [Hz]")  # fmt: skip
     rows, of_group = [], 1.0
-    for line in (MEASURED / "own-trackers.jsonl").read_text().splitlines():
-        r = json.loads(line)
+    for r in measured("own-trackers"):
         of_group = r["error"] if r["trackers"] == "group" else of_group
         is_own = r["trackers"] == "own"
         loss = "as in the scenario" if r["loss"] is None else f"{100.0 * r['loss']:.0f} %"
@@ -396,11 +393,36 @@ def recording_results() -> str:
 def mds_results() -> str:
     """Return the table of errors of `joint` and of MDS of each instant."""
     rows = []
-    for line in map(json.loads, (MEASURED / "mds-results.jsonl").read_text().splitlines()):
+    for line in measured("mds-results"):
         errors = ["-" if line[k] is None else f"{line[k]:.2f}" for k in ("joint", "mds")]
         rows.append([line["case"], str(line["nodes"]), *errors, str(line["instants"])])
     head = ("recording", "nodes", "joint [m]", "MDS [m]", "instants with all pairs")
     return markdown(head, rows, right=", ".join(head[1:]))
+
+
+def tracker_cost() -> str:
+    """Return the table of the times of `joint` and of its peers on the same measurements."""
+    loops = {r["case"]: r["value"] for r in measured("tracker-cost-loops")}
+    times: dict[str, dict[str, float]] = {}
+    for r in measured("tracker-cost"):
+        if r["case"].startswith("joint"):
+            peers = times.setdefault(r["case"], {"joint": r["value"]})
+            peers[r["peer"].split()[0]] = r["peer_value"]
+    rows = []
+    for case, of in times.items():
+        gtsam = f"{of['GTSAM']:.0f}" if "GTSAM" in of else ""
+        rows.append([
+            case.removeprefix("joint, "), f"{of['joint']:.1f}",
+            f"{loops[case] / of['joint']:.1f}", f"{of['filterpy']:.0f}", gtsam,
+        ])  # fmt: skip
+    head = ("a step of", "joint [us]", "plain loops over SIMD", "filterpy [us]", "GTSAM [us]")
+    return markdown(head, rows, right=", ".join(head[1:]))
+
+
+def measured(name: str) -> list[dict[str, Any]]:
+    """Return the rows of a file of results."""
+    lines = (MEASURED / f"{name}.jsonl").read_text().splitlines()
+    return [json.loads(line) for line in lines]
 
 
 def parameters(params: Any, names: tuple[str, ...]) -> str:
@@ -435,6 +457,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "second-world": second_world,
     "own-trackers": own_trackers,
     "time-to-ok": time_to_ok,
+    "tracker-cost": tracker_cost,
     "policy-results": policy_results,
     "room-results": room_results,
     "recording-results": recording_results,
