@@ -41,10 +41,10 @@ def new_health():
     return np.zeros((1, 1, imu.N_HEALTH))
 
 
-def inspect(health, samples):
+def inspect(health, samples, dt=0.01):
     judged, usable = samples.copy(), np.zeros(len(samples), dtype=bool)
     for k in range(len(samples)):
-        usable[k] = imu.inspect_sample(SANITY, health, 0, 0, samples[None], 0, k)
+        usable[k] = imu.inspect_sample(SANITY, health, 0, 0, samples[None], 0, k, dt)
         judged[k] = health[0, 0, imu.GOOD : imu.GOOD + 6]
     return judged, usable
 
@@ -181,6 +181,17 @@ def test_single_absurd_readings_are_replaced():
     assert usable.all()
     np.testing.assert_array_equal(judged[20], samples[19])
     np.testing.assert_array_equal(np.delete(judged, 20, 0), np.delete(samples, 20, 0))
+
+
+@pytest.mark.parametrize(
+    ("dt", "jump", "is_odd"), [(0.002, 11.0, True), (0.01, 9.0, False), (0.05, 45.0, False)]
+)
+def test_slow_sensors_may_turn_further_between_two_samples(dt, jump, is_odd):
+    samples = np.zeros((3, 6))
+    samples[1, 0] = jump
+    judged, usable = inspect(new_health(), samples, dt)
+    assert usable.all()
+    np.testing.assert_array_equal(judged[1], samples[0 if is_odd else 1])
 
 
 def test_lost_samples_are_bridged():

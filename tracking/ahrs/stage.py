@@ -76,7 +76,7 @@ def take_sample(c, s, e, n, t, kind, values, valid, k):
     m, good = s.node, s.health
     has_field = m[e, n, HAS_FIELD] != 0.0 and c.magnetic[n]
     m[e, n, HAS_FIELD] = 0.0
-    if not inspect_sample(c.sanity[0], s.health, e, n, values, e, k):
+    if not inspect_sample(c.sanity[0], s.health, e, n, values, e, k, c.dt[n]):
         valid[e, k] = False
         return
     ax, ay, az = good[e, n, GOOD + 3], good[e, n, GOOD + 4], good[e, n, GOOD + 5]

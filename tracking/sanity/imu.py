@@ -33,7 +33,7 @@ def noise_scale(health, e, n, cut_x, cut_y, cut_z, levelled):
 
 
 @small_kernel
-def inspect_sample(q, health, e, n, values, row, k):
+def inspect_sample(q, health, e, n, values, row, k, dt):
     """Check a sample; the columns GOOD hold the reading to use in its place.
 
     Args:
@@ -44,17 +44,19 @@ def inspect_sample(q, health, e, n, values, row, k):
         values: Gyroscope [rad/s] and specific force [m/s2] from column 0, (row, sample, 6...).
         row: Row of `values`.
         k: Sample of `values`.
+        dt: Sample period of the node [s].
 
     Returns:
         False for a sensor that is stuck.
     """
     seen = health[e, n, SEEN] != 0.0
     equal, odd = seen, False
+    gyr_jump = q.gyr_jump * max(1.0, dt / q.jump_period)
     for a in range(6):
         x = values[row, k, a]
         equal = equal and x == health[e, n, LAST + a]
         health[e, n, LAST + a] = x
-        odd = odd or abs(x - health[e, n, GOOD + a]) > (q.gyr_jump if a < 3 else q.acc_jump)
+        odd = odd or abs(x - health[e, n, GOOD + a]) > (gyr_jump if a < 3 else q.acc_jump)
     health[e, n, SEEN] = 1.0
     health[e, n, N_SAME] = health[e, n, N_SAME] + 1.0 if equal else 0.0
     health[e, n, N_ODD] = health[e, n, N_ODD] + 1.0 if odd and seen else 0.0
