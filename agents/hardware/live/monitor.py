@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from agents.hardware.live.checks import Checks
 from agents.hardware.live.history import History
 from agents.hardware.live.rates import Rates
 from agents.hardware.live.snapshot import Snapshot, take_snapshot
 from hardware_bridge.live.swarm import LiveSwarm
+from tracking.findings import Finding
 from tracking.measurements import MeasurementBlock
 
 
@@ -15,7 +17,12 @@ class Monitor:
     """Collects statistics of a swarm; call `after_step` after each of its steps."""
 
     def __init__(
-        self, swarm: LiveSwarm, *, estimates: bool = True, measurements: bool = False
+        self,
+        swarm: LiveSwarm,
+        *,
+        estimates: bool = True,
+        measurements: bool = False,
+        checks: Checks | None = None,
     ) -> None:
         """Begin to monitor a swarm.
 
@@ -23,6 +30,7 @@ class Monitor:
             swarm: Swarm to monitor; its `tap` is replaced.
             estimates: Whether to keep all estimates.
             measurements: Whether to keep all measurements.
+            checks: Checks of the measurements.
         """
         self.swarm = swarm
         self.rates = Rates(swarm.group.n_nodes)
@@ -30,17 +38,20 @@ class Monitor:
         self.t_ns = swarm.intake.start_ns
         """[ns] Host time of the last step."""
         self.decisions = 0
-        self._estimates, self._measurements = estimates, measurements
+        self._estimates, self._measurements, self._checks = estimates, measurements, checks
+        self._found: list[Finding] = []
         self._blocks: list[MeasurementBlock] = []
         swarm.tap = self._take
 
-    def after_step(self, t_ns: int) -> None:
-        """Record a step of the swarm at a host time [ns]."""
+    def after_step(self, t_ns: int) -> list[Finding]:
+        """Record a step of the swarm at a host time [ns]; return new findings."""
         self.t_ns = t_ns
         self.decisions += 1
         self.rates.close(self.swarm.intake.seconds(t_ns))
         if self._estimates:
             self.history.add(t_ns, self.swarm.estimate)
+        found, self._found = self._found, []
+        return found
 
     def snapshot(self) -> Snapshot:
         """Return a snapshot after the last step."""
@@ -76,3 +87,6 @@ class Monitor:
         self.rates.take(block)
         if self._measurements:
             self._blocks.append(block.env(0))
+        if self._checks is not None:
+            now = self.swarm.intake.seconds(self.t_ns)
+            self._found += self._checks.step(now, block)

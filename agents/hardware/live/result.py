@@ -7,6 +7,7 @@ from typing import Any
 
 from tracking.arrays import I64
 from tracking.estimate import TeamEstimate
+from tracking.findings import Finding
 from tracking.params.short_repr import short_repr
 
 
@@ -35,6 +36,8 @@ class LiveResult:
     """Decoder statistics of each stream."""
     notices: tuple[tuple[float, str], ...] = ()
     """Notices to the user: time [s] and text."""
+    findings: tuple[Finding, ...] = ()
+    """Faults of the measurements (`docs/reference/findings.md`)."""
     recording: str | None = None
     """File of the recording; None if not recorded."""
     recording_lost: str | None = None
@@ -52,6 +55,7 @@ class LiveResult:
             "late_decisions": self.late_decisions,
             **self.counts,
             "notices": len(self.notices),
+            "findings": [found.record for found in self.findings],
             "recording": self.recording,
             "recording_lost": self.recording_lost,
         }

@@ -7,11 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from agents.errors import UsageError
+from agents.hardware.live.checks import Checks
 from agents.hardware.live.monitor import Monitor
 from agents.hardware.live.result import LiveResult
 from hardware_bridge.config import SwarmConfig, read_config
 from hardware_bridge.live.bridge import Bridge
 from hardware_bridge.live.feed import LiveFeed
+from hardware_bridge.live.swarm import load_calibration
+from tracking.findings import KINDS
 
 Watch = Callable[[Monitor, list[tuple[float, str]]], bool | None]
 """Callback with the monitor and the new notices, time [s] and text; False ends the run."""
@@ -42,8 +45,10 @@ def live(
         raise UsageError(f"seconds: expected a number above 0, got {seconds:g}")
     swarm = config if isinstance(config, SwarmConfig) else read_config(config)
     notices: list[tuple[float, str]] = []
-    with Bridge(swarm, record=record) as bridge:
-        monitor = Monitor(bridge.swarm, estimates=keep)
+    checks = Checks(swarm.name, swarm.constellation, load_calibration(swarm))
+    with contextlib.closing(checks), Bridge(swarm, record=record) as bridge:
+        measures = swarm.tracker.source == "measurements"
+        monitor = Monitor(bridge.swarm, estimates=keep, checks=checks if measures else None)
         with contextlib.suppress(KeyboardInterrupt):
             _listen(bridge, monitor, seconds, watch, notices)
         notices += _drain(bridge.feed, monitor)
@@ -60,6 +65,7 @@ def live(
         counts=monitor.counts,
         streams=tuple(monitor.streams),
         notices=tuple(notices),
+        findings=tuple(checks.findings),
         recording=None if record is None else str(record),
         # Final only after the recorder was closed.
         recording_lost=None if recorder is None else recorder.lost,
@@ -78,7 +84,8 @@ def _listen(
     while seconds is None or intake.seconds(monitor.t_ns) < seconds:
         t_ns = bridge.feed.advance()
         bridge.swarm.step(t_ns)
-        monitor.after_step(t_ns)
+        for found in monitor.after_step(t_ns):
+            bridge.feed.note(t_ns, f"{found.text}: {KINDS[found.name].remedy}")
         new = _drain(bridge.feed, monitor)
         notices += new
         if watch is not None and watch(monitor, new) is False:
