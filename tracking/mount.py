@@ -51,6 +51,12 @@ class Mount:
             if value is not None and not (math.isfinite(value) and low <= value <= high):
                 raise ConfigError(f"{where}.{name}: expected {low:g} to {high:g}, got {value!r}")
 
+    @property
+    def table(self) -> dict[str, float]:
+        """The values that are not estimated, by their keys in a file."""
+        given = ((key, getattr(self, name)) for key, name in KEYS.items())
+        return {key: float(value) for key, value in given if value is not None}
+
     def prior(self, vehicle: VehicleParams) -> tuple[float, float, float, float]:
         """Return mean and std of `ahead` [m], then of `slip` [s2/m]; std 0 for known values."""
         ahead, ahead_std = vehicle.ahead, vehicle.ahead_std

@@ -23,6 +23,7 @@ from relpos_env.sensors.proximity import ProximitySimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.world.car import CarParams
 from tracking.arrays import F64
+from tracking.mount import Mount
 
 Furnish = Callable[[Any, np.random.Generator], None]
 """``(relpos_env.world.pymunk_space.PhysicsSpace, generator)``"""
@@ -54,6 +55,9 @@ class Scenario:
     in_line: bool = field(default=False, repr=False, metadata={"in_file": False})
     """Constructor argument equivalent to `layout="line"`; always False when read."""
     car: CarParams = field(default_factory=CarParams)
+    mounts: tuple[Mount, ...] = ()
+    """Mounts of the trackers of the first cars, which the tracker is given. An `ahead` that is
+    left out is drawn and estimated, as all of the other cars."""
     imu: ImuSimParams = field(default_factory=ImuSimParams)
     mag: MagSimParams = field(default_factory=MagSimParams)
     odometer: OdometerSimParams = field(default_factory=OdometerSimParams)

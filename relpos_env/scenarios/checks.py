@@ -16,6 +16,8 @@ from relpos_env.scenarios.rooms.obstacle import Obstacle, boxes_of
 from relpos_env.scenarios.rooms.overlap import overlap
 from relpos_env.world.car import CarParams
 from tracking.arrays import F64
+from tracking.errors import ConfigError
+from tracking.mount import Mount
 
 MOST_CARS = 20
 """[-] Maximum number of cars for which radio messages and trackers are tested."""
@@ -39,6 +41,8 @@ class _Checked(Protocol):
     def start_area(self) -> Area | None: ...
     @property
     def obstacles(self) -> tuple[Obstacle, ...]: ...
+    @property
+    def mounts(self) -> tuple[Mount, ...]: ...
     @property
     def gap(self) -> Gap | None: ...
     @property
@@ -90,6 +94,17 @@ def _check_room(s: _Checked) -> None:
         raise EnvError(f"layout: expected one of {', '.join(LAYOUTS)}, got {s.layout!r}")
     if s.start_area is not None:
         _check_area(s.start_area)
+    _check_mounts(s.mounts)
+
+
+def _check_mounts(mounts: tuple[Mount, ...]) -> None:
+    if len(mounts) > MOST_CARS:
+        raise EnvError(f"mounts: expected at most {MOST_CARS}, got {len(mounts)}")
+    for k, mount in enumerate(mounts):
+        try:
+            mount.check(f"mounts[{k}]")
+        except ConfigError as error:
+            raise EnvError(str(error)) from None
 
 
 def _check_area(area: Area) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from relpos_env.sensors.odometer import OdometerSimParams
 from relpos_env.sensors.radio.params import RadioSimParams
 from relpos_env.world.car import CarParams
 from tracking.arrays import F64
+from tracking.mount import Mount
 
 MOST_LOST = 0.9
 """[1] Upper limit of the message loss rate."""
@@ -34,11 +36,26 @@ def draw_car(car: CarParams, what: Randomisation, rng: np.random.Generator) -> C
     return replace(car, friction=grip * car.friction, mass=load * car.mass)
 
 
-def draw_mounts(n: int, what: Randomisation, rng: np.random.Generator) -> F64:
-    """Sample tracker positions, forward, left and up, (car, 3) [m]; see `Randomisation`."""
+def draw_mounts(
+    n: int, given: Sequence[Mount], car: CarParams, what: Randomisation, rng: np.random.Generator
+) -> F64:
+    """Sample tracker positions, forward, left and up of the centre of mass, (car, 3) [m].
+
+    Args:
+        n: Number of cars.
+        given: Mounts of the first cars, which keep them.
+        car: Car, for the distance of its rear axle.
+        what: Intervals of the others.
+        rng: Generator.
+    """
     low, high = np.transpose([what.mount_ahead, what.mount_aside])
     in_plane = rng.uniform(low, high, (n, 2))
-    return np.column_stack([in_plane, rng.uniform(*what.mount_height, n)])
+    mounts = np.column_stack([in_plane, rng.uniform(*what.mount_height, n)])
+    for drawn, mount in zip(mounts, given, strict=False):
+        drawn[1:] = mount.aside, mount.height
+        if mount.ahead is not None:
+            drawn[0] = mount.ahead - car.rear_axle
+    return mounts
 
 
 def draw_imu(imu: ImuSimParams, what: Randomisation, rng: np.random.Generator) -> ImuSimParams:

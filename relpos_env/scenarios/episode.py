@@ -97,7 +97,7 @@ def draw_episode(
     start = np.zeros((n_slots, 3))
     start[:n] = poses
     present = np.arange(n_slots) < n
-    mounts = draw_mounts(n_slots, what, rngs["mounts"])
+    mounts = draw_mounts(n_slots, s.mounts, s.car, what, rngs["mounts"])
     for array in (start, present, mounts):
         array.setflags(write=False)
     places = _places_to_join(s, joins, poses, rngs["joins"]) if what.has_life and joins else []

@@ -23,6 +23,8 @@ from relpos_env.scenarios import (
 from relpos_env.scenarios.cars import CARS_NLOS
 from relpos_env.scenarios.catalogue import FILES, scenario_from
 from relpos_env.sensors.radio.channel import INDOOR
+from relpos_env.world.car_nodes import car_constellation
+from tracking.mount import Mount
 from tracking.params.tables import readable
 from tracking.ranging.frames.airtime import FAST_PHY
 
@@ -247,3 +249,39 @@ def test_the_example_of_the_manual_loads(tmp_path):
     example = text.split("```toml\n", 1)[1].split("```", 1)[0]
     s = load_scenario(save(tmp_path, example))
     assert draw_episode(s, 8, 60.0, np.random.default_rng(0)).present.sum() >= 2
+
+
+def test_mounts_of_a_file_hold_in_the_world_and_in_the_tracker(tmp_path):
+    text = """
+    extends = "cars-los"
+    [randomisation]
+    mount_ahead = [-0.1, 0.1]
+    mount_aside = [-0.05, 0.05]
+    [[mounts]]
+    ahead = 0.3
+    aside = 0.02
+    height = 0.1
+    [[mounts]]
+    aside = -0.01
+    """
+    mounted = load_scenario(save(tmp_path, text))
+    axle = mounted.car.rear_axle
+    draws = [
+        draw_episode(mounted, 3, 20.0, np.random.default_rng(seed)).mounts for seed in range(20)
+    ]
+    for drawn in draws:
+        np.testing.assert_allclose(drawn[0], [0.3 - axle, 0.02, 0.1])
+        np.testing.assert_allclose(drawn[1, 1:], [-0.01, 0.0])
+    assert np.ptp([drawn[1, 0] for drawn in draws]) > 0.05
+    told = [node.mount for node in car_constellation(mounted, 3).nodes]
+    assert told == [Mount(ahead=0.3, aside=0.02, height=0.1), Mount(aside=-0.01), Mount()]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [("ahead = 11.0", r"mounts\[0\].ahead: expected -10 to 10"), ("side = 1.0", "side"),
+     ('ahead = "far"', "ahead")],
+)  # fmt: skip
+def test_a_wrong_mount_is_named(tmp_path, table, message):
+    with pytest.raises(EnvError, match=message):
+        load_scenario(save(tmp_path, f'extends = "cars-los"\n[[mounts]]\n{table}\n'))

@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tracking.constellation import NodeConfig
 from tracking.errors import LogError
 from tracking.log.folder import ACC, FORMAT, GYR, MAG, POWERS, QUAT, Log
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.mount import KEYS, Mount
+from tracking.mount import Mount
 
 TABLES = ("ranges", "imu", "mag", "state", "members", "truth")
 """Tables of a log, files with the suffix .csv or .csv.gz."""
@@ -128,18 +127,13 @@ def _meta(log: Log) -> str:
         if node.initial_heading is not None:
             lines.append(f"initial_heading_rad = {float(node.initial_heading)!r}")
         if node.mount != Mount():
-            lines += _mount(node)
+            lines += ["", f"[nodes.{node.id}.mount]"]
+            lines += [f"{key} = {value!r}" for key, value in node.mount.table.items()]
     for antenna in c.antennas:
         offset = ", ".join(repr(float(v)) for v in antenna.offset_b)
         lines += ["", f"[antennas.{antenna.id}]", f"node = {antenna.node}"]
         lines.append(f"offset_m = [{offset}]")
     return "\n".join(lines) + "\n"
-
-
-def _mount(node: NodeConfig) -> list[str]:
-    given = ((key, getattr(node.mount, name)) for key, name in KEYS.items())
-    known = [f"{key} = {float(value)!r}" for key, value in given if value is not None]
-    return ["", f"[nodes.{node.id}.mount]", *known]
 
 
 def _quoted(text: str) -> str:

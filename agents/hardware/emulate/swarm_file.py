@@ -14,7 +14,8 @@ from hardware_bridge.emulator.node import EmulatedNode
 from relpos_env.config import Parts
 from relpos_env.interface.actions import MAX_SPEED
 from relpos_env.timing import DT
-from tracking.constellation import Constellation
+from tracking.constellation import Constellation, NodeConfig
+from tracking.mount import Mount
 
 
 def swarm_toml(
@@ -38,7 +39,7 @@ def swarm_toml(
         "name": f"emulated {parts.scenario.name}",
         "dimensions": constellation.dimensions,
         "heading": constellation.heading,
-        "nodes": {n.id: {"vehicle": n.vehicle, "imu_hz": 1.0 / DT} for n in constellation.nodes},
+        "nodes": {n.id: _node(n) for n in constellation.nodes},
         "antennas": {
             a.id: {"node": a.node, "offset_m": list(a.offset_b)} for a in constellation.antennas
         },
@@ -80,6 +81,12 @@ def node_port(node: int, k: int) -> str:
 def car_port(node: int) -> str:
     """Return the name of the port of the car that carries a node."""
     return f"car{node}"
+
+
+def _node(node: NodeConfig) -> dict[str, Any]:
+    """Return the table of a node."""
+    table = {"vehicle": node.vehicle, "imu_hz": 1.0 / DT}
+    return table if node.mount == Mount() else {**table, "mount": node.mount.table}
 
 
 def _link(
