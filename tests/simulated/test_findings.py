@@ -14,6 +14,7 @@ from tracking.errors import LogError
 from tracking.findings import KINDS, Finding, examine, refuse_errors
 from tracking.findings.at_rest import correct_at_rest, find_in_samples, rest_of
 from tracking.findings.gyroscope import find_gyroscope
+from tracking.findings.turned_magnetometer import correct_magnetometers, turned
 from tracking.measurements import Kind
 
 
@@ -171,6 +172,28 @@ def test_the_clock_of_a_single_node_is_corrected(drive):
         (corrected.block.kind[0] == Kind.IMU) & (corrected.block.i[0] == 0)
     ]
     assert np.abs(after - drive.block.t[0][rows]).max() < 0.04
+
+
+@pytest.mark.parametrize(("node", "degrees"), [(0, 30.0), (2, -40.0)])
+def test_a_magnetometer_that_is_turned_is_turned_back(drive, node, degrees):
+    wrong = replace(drive, block=turned(drive.block, node, np.radians(degrees)))
+    corrected, (found,) = examine(wrong)
+    assert (found.name, found.nodes) == ("mag-turned", (drive.constellation.ids[node],))
+    t, before, after = (log.block.t[0] for log in (drive, wrong, corrected))
+    np.testing.assert_array_equal(t, before)
+    np.testing.assert_array_equal(t, after)
+    own = (drive.block.kind[0] == Kind.MAG) & (drive.block.i[0] == node)
+    right, back = (log.block.values[0, own, :2] @ [1.0, 1.0j] for log in (drive, corrected))
+    assert abs(np.degrees(np.angle(back / right)).mean()) < 5.0
+    rest = ~own
+    np.testing.assert_array_equal(corrected.block.values[0, rest], drive.block.values[0, rest])
+
+
+def test_magnetometers_that_are_all_turned_alike_turn_only_north(drive):
+    block = drive.block
+    for node in range(3):
+        block = turned(block, node, 0.7)
+    assert correct_magnetometers(replace(drive, block=block), lambda share: None)[1] == []
 
 
 def test_of_a_group_that_is_lost_nothing_is_said():

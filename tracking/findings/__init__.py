@@ -10,6 +10,7 @@ from tracking.findings.imu_against_ranges import find_suspects, find_wrong_axes
 from tracking.findings.ranges import find_range_errors
 from tracking.findings.stamps import find_bad_stamps
 from tracking.findings.trials import Progress
+from tracking.findings.turned_magnetometer import correct_magnetometers
 from tracking.findings.use import find_in_estimates, find_unused
 from tracking.log.folder import Log
 
@@ -22,23 +23,26 @@ def examine(log: Log, progress: Progress = lambda share: None) -> tuple[Log, lis
         progress: Called with the completed share, 0 to 1.
 
     Returns:
-        The log, with gyroscope biases and clocks corrected where possible, and the findings.
+        The log, with gyroscope biases, clocks and turned magnetometers corrected where possible,
+        and the findings.
     """
     log, at_rest = correct_at_rest(log)
     found = [*find_unused(log), *find_bad_stamps(log), *at_rest, *find_gyroscope(log)]
     if any(f.severity == "error" for f in found):
         return log, found  # the next checks need sensors without errors
-    suspects = find_suspects(log, _part(progress, 0.0, 0.3))
-    log, of_clocks = correct_clocks(log, suspects, _part(progress, 0.3, 0.8))
+    suspects = find_suspects(log, _part(progress, 0.0, 0.2))
+    log, of_clocks = correct_clocks(log, suspects, _part(progress, 0.2, 0.6))
     found += of_clocks
     if any(f.severity == "error" for f in of_clocks):
         return log, found
     if of_clocks and suspects:
-        suspects = find_suspects(log, _part(progress, 0.8, 0.9))
-    rest = _part(progress, 0.9, 1.0)
+        suspects = find_suspects(log, _part(progress, 0.6, 0.7))
     if suspects:
-        return log, [*found, *find_wrong_axes(log, list(suspects), rest)]
-    return log, [*found, *find_range_errors(log, rest)]
+        axes = find_wrong_axes(log, list(suspects), _part(progress, 0.7, 1.0))
+        return log, [*found, *axes]
+    log, of_magnetometers = correct_magnetometers(log, _part(progress, 0.7, 0.9))
+    found += of_magnetometers
+    return log, [*found, *find_range_errors(log, _part(progress, 0.9, 1.0))]
 
 
 def _part(progress: Progress, first: float, last: float) -> Progress:

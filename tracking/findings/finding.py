@@ -49,6 +49,11 @@ KINDS: dict[str, Kind] = {
         "gyroscope and magnetometer of a node have different axes or signs",
         "say how they are mounted: `imu_axes`, `mag_axes` of the node; x forward, y left, z up",
     ),
+    "mag-turned": Kind(
+        "warning",
+        "the magnetometer of a level vehicle is turned about the vertical; it is turned back",
+        "mount it along the axes of the IMU, or calibrate it again where the vehicle drives",
+    ),
     "clock-offset": Kind(
         "error",
         "an IMU has another clock than the ranges, by more than is corrected",
