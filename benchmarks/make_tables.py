@@ -298,13 +298,13 @@ def second_world() -> str:
 def time_to_ok() -> str:
     """Return the table of the times until pairs are ok."""
     head = ("runs of", "an efficient estimator [s]", "`ok` [s]", "within twice", "never `ok`",
-            "`ok` if told the noise [s]", "within twice if told")  # fmt: skip
+            "`ok` with matched noise [s]", "matched: within twice")  # fmt: skip
     rows = []
     for r in measured("time-to-ok"):
         rows.append([
             r["kind"], f"{r['needed_s']:.1f}", f"{r['ok_s']:.1f}",
             f"{100.0 * r['within_twice']:.0f} %", f"{r['never']}/{r['sufficient']}",
-            f"{r['told_s']:.1f}", f"{100.0 * r['told_within_twice']:.0f} %",
+            f"{r['matched_s']:.1f}", f"{100.0 * r['matched_within_twice']:.0f} %",
         ])  # fmt: skip
     return markdown(head, rows, right=", ".join(head[1:]))
 

@@ -63,9 +63,9 @@ def times(kind: str, seed: int) -> tuple[float, float, float]:
     bound = posterior_bound(log, params, skip=0.0, turn_std=turn)
     enough = (bound.pair_rms < VEHICLES[vehicle].accuracy).all(axis=1)
     default = TrackerParams()
-    told = replace(default, filter=replace(default.filter, joint=params))
+    informed = replace(default, filter=replace(default.filter, joint=params))
     first = [_first(bound.t, enough)]
-    for given in (default, told):
+    for given in (default, informed):
         estimate = Tracker(constellation, given).run(log.block, bound.t).take(0)
         first.append(_first(bound.t, estimate.ok.all(axis=1)))
     return first[0], first[1], first[2]
@@ -81,7 +81,7 @@ def main() -> None:
     n, lines = int([*sys.argv[1:], 30][0]), []
     for kind in (*ROOMS, *(f"second world, {vehicle}" for vehicle in WORLDS)):
         found = [times(kind, seed) for seed in range(FIRST, FIRST + n)]
-        needed, ok, told = np.array(found).T
+        needed, ok, informed = np.array(found).T
         known = np.isfinite(needed)
         late = np.maximum(2.0 * needed[known], 1.0)
         lines.append(
@@ -93,8 +93,8 @@ def main() -> None:
                 "ok_s": float(np.median(ok[known])),
                 "within_twice": float((ok[known] <= late).mean()),
                 "never": int(np.isinf(ok[known]).sum()),
-                "told_s": float(np.median(told[known])),
-                "told_within_twice": float((told[known] <= late).mean()),
+                "matched_s": float(np.median(informed[known])),
+                "matched_within_twice": float((informed[known] <= late).mean()),
             }
         )
         print(json.dumps(lines[-1]), flush=True)

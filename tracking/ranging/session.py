@@ -25,7 +25,7 @@ from tracking.ranging.joining import Joining
 from tracking.ranging.listening import Listener
 from tracking.ranging.members import Members
 from tracking.ranging.params import SessionParams
-from tracking.ranging.transmitter import Transmitter, Words
+from tracking.ranging.transmitter import Message, Transmitter
 from tracking.ranging.turns import Turns, Waiting
 
 
@@ -169,8 +169,8 @@ class Session:
         rows = []
         if kind is not Type.JOIN:
             rows = self._peers.table(self._members.others(), self.transmitter.room)
-        words = Words(kind, root, self.round, min(turns.cursor, n), n, rows)
-        frames, sent, turns.expected = self.transmitter.say(words, at)
+        message = Message(kind, root, self.round, min(turns.cursor, n), n, rows)
+        frames, sent, turns.expected = self.transmitter.send(message, at)
         self._out += frames
         self._listener.note_sent(sent)
         turns.cursor += kind is not Type.JOIN
@@ -240,9 +240,11 @@ class Session:
         if echo or frame.type is Type.ALERT:  # after an alert the other node is silent
             self._unreadable()
             return
-        words = Words(Type.ALERT, frame.root, frame.round, min(frame.slot + 1, frame.n), frame.n)
+        message = Message(
+            Type.ALERT, frame.root, frame.round, min(frame.slot + 1, frame.n), frame.n
+        )
         at = max(end, self._time.now + self._slots.header) + self._slots.turnaround
-        self._out += self.transmitter.say(words, at)[0]
+        self._out += self.transmitter.send(message, at)[0]
         self._forget()
         self.role, self.root = Role.MUTED, self.id
         self._turns.wait(Waiting.WATCHDOG, self._time.now + self._dice.pause(self._params.mute))

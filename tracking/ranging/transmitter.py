@@ -21,7 +21,7 @@ from tracking.ranging.params import SessionParams
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class Message:
     """A message without its bytes and times."""
 
     type: Type
@@ -52,11 +52,11 @@ class Transmitter:
         """
         self._motion = None if motion is None else (motion, at)
 
-    def say(self, words: Words, at: int) -> tuple[list[Transmission], int, int]:
+    def send(self, message: Message, at: int) -> tuple[list[Transmission], int, int]:
         """Build the frames of a message.
 
         Args:
-            words: Fields of the message.
+            message: Fields of the message.
             at: Earliest first stamp moment, own clock without wraps.
 
         Returns:
@@ -65,14 +65,14 @@ class Transmitter:
         """
         out = []
         phy = self._params.phy
-        parts = split(words.rows, phy.max_frame - phy.motion_bytes)
+        parts = split(message.rows, phy.max_frame - phy.motion_bytes)
         stamp = at
         for p, rows in enumerate(parts):
             at = on_grid(at)
             stamp = at + self._params.antenna_delay
             frame = Frame(
-                words.type, self._id, words.root, words.round, words.slot, words.n, self._boot,
-                stamp % MODULUS, rows, self._params.pan, self._sequence, p, len(parts),
+                message.type, self._id, message.root, message.round, message.slot, message.n,
+                self._boot, stamp % MODULUS, rows, self._params.pan, self._sequence, p, len(parts),
                 self._motion_at(stamp) if rows and p + 1 == len(parts) else b"",
             )  # fmt: skip
             data = encode(frame)

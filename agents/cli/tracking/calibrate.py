@@ -37,7 +37,7 @@ def calibrate() -> None:
 @calibrate.command("imu")
 @_shared
 @click.option(
-    "--level", is_flag=True, help="Assume that nodes are level whenever they are at rest."
+    "--assume-level", is_flag=True, help="Assume that nodes are level whenever they are at rest."
 )
 @click.option(
     "--gravity",
@@ -45,7 +45,7 @@ def calibrate() -> None:
     show_default=True,
     help="Gravity at the place of the recording [m/s2].",
 )
-def imu(log: Path, out: Path, as_json: bool, level: bool, gravity: float) -> None:
+def imu(log: Path, out: Path, as_json: bool, assume_level: bool, gravity: float) -> None:
     """Estimate gyroscope and accelerometer offsets at rest."""
     from agents.evaluation.calibrate import calibrate_imus
     from agents.reports.calibration_report import IMU_HEADER, imu_rows
@@ -53,7 +53,7 @@ def imu(log: Path, out: Path, as_json: bool, level: bool, gravity: float) -> Non
 
     if not 9.7 <= gravity <= 9.9:
         raise UsageError(f"--gravity: expected 9.7 to 9.9 m/s2, got {gravity:g}")
-    result = calibrate_imus(read_log(log), level=level, gravity=gravity)
+    result = calibrate_imus(read_log(log), level=assume_level, gravity=gravity)
     if not _finish(result, out, as_json):
         print_table("Offsets at rest", IMU_HEADER, imu_rows(result))
         _tell(result, out)
