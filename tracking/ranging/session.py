@@ -240,11 +240,9 @@ class Session:
         if echo or frame.type is Type.ALERT:  # after an alert the other node is silent
             self._unreadable()
             return
-        message = Message(
-            Type.ALERT, frame.root, frame.round, min(frame.slot + 1, frame.n), frame.n
-        )
-        at = max(end, self._time.now + self._slots.header) + self._slots.turnaround
-        self._out += self.transmitter.send(message, at)[0]
+        slot, at = min(frame.slot + 1, frame.n), max(end, self._time.now + self._slots.header)
+        alert = Message(Type.ALERT, frame.root, frame.round, slot, frame.n)
+        self._out += self.transmitter.send(alert, at + self._slots.turnaround)[0]
         self._forget()
         self.role, self.root = Role.MUTED, self.id
         self._turns.wait(Waiting.WATCHDOG, self._time.now + self._dice.pause(self._params.mute))
