@@ -36,13 +36,15 @@ check: $(VENV)/.dev
 docs: $(VENV)/.dev
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going -q -b html docs build/docs
 
-# Source distribution and wheel; the wheel is installed into an empty environment and tried.
+# Source distribution and wheel; the wheel is installed into an empty environment, and README.md
+# is run there, block by block.
 dist: $(VENV)/.dev
 	rm -rf dist build/dist-env
 	$(BIN)/python -m build --no-isolation --outdir dist .
 	$(PYTHON) -m venv build/dist-env
-	build/dist-env/bin/python -m pip --disable-pip-version-check install --quiet -c constraints.txt dist/*.whl
-	cd build && dist-env/bin/relpos --version && dist-env/bin/python -c 'import tracking, relpos_env, agents, hardware_bridge'
+	build/dist-env/bin/python -m pip --disable-pip-version-check install --quiet --no-compile \
+	  -c constraints.txt "$$(ls dist/*.whl)[train,hardware]"
+	$(BIN)/python tests/run_readme.py build/dist-env/bin
 
 # Whether everything imports with the lowest versions that pyproject.toml admits.
 lowest: .venv-lowest/.installed
