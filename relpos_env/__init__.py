@@ -18,12 +18,14 @@ register_environments()
 _CLASSES = {
     "EnvError": "relpos_env.errors",
     "FormationGymEnv": "relpos_env.api.gym_env",
+    "FormationTorchEnv": "relpos_env.api.torchrl_env",
     "FormationVecEnv": "relpos_env.api.sb3_vec_env",
     "FormationVectorEnv": "relpos_env.api.vector_env",
     "Scenario": "relpos_env.scenarios",
     "Simulation": "relpos_env.simulation.simulation",
 }
-"""Module of each class, imported on first use; that of Stable-Baselines3 needs its extra."""
+"""Module of each class, imported on first use; those of Stable-Baselines3 and TorchRL need their
+extras."""
 
 __all__ = [
     "EnvError", "FormationGymEnv", "FormationVectorEnv", "Scenario", "Simulation", "formation_v0",
