@@ -11,10 +11,11 @@ from tests.second_world.record import record
 from tests.second_world.world import draw
 from tracking.constellation import NodeConfig
 from tracking.errors import LogError
-from tracking.findings import KINDS, Finding, examine, refuse_errors
+from tracking.findings import KINDS, Finding, examine, find_unused, refuse_errors
 from tracking.findings.at_rest import correct_at_rest, find_in_samples, rest_of
 from tracking.findings.gyroscope import find_gyroscope
 from tracking.findings.turned_magnetometer import correct_magnetometers, turned
+from tracking.log import read_log, write_log
 from tracking.measurements import Kind
 
 
@@ -282,6 +283,18 @@ def test_all_errors_are_told_at_once():
     with pytest.raises(LogError, match=r"node 1: off.*\n.*node 2: off"):
         refuse_errors(errors)
     assert all(kind.meaning and kind.remedy for kind in KINDS.values())
+
+
+def test_misspelt_keys_are_named(drive, tmp_path):
+    write_log(tmp_path / "log", drive)
+    meta = tmp_path / "log" / "meta.toml"
+    text = meta.read_text().replace("[nodes.1]", "[nodes.1]\ninitial_heading = 0.3")
+    meta.write_text(text.replace("dimensions", "accuracy = 0.2\ndimensions"))
+    log = read_log(tmp_path / "log")
+    assert log.unused_keys == ("accuracy", "nodes.1.initial_heading")
+    (found,) = [f for f in find_unused(log) if f.name == "unused-keys"]
+    assert found.severity == "warning"
+    assert "accuracy, nodes.1.initial_heading" in found.text
 
 
 def test_progress_of_checks_goes_up():

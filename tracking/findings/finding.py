@@ -106,6 +106,11 @@ KINDS: dict[str, Kind] = {
         "an IMU without a magnetometer is not used where the heading is magnetic",
         '`heading = "initial"` in meta.toml',
     ),
+    "unused-keys": Kind(
+        "warning",
+        "meta.toml has keys that are not read, such as misspelt ones",
+        "correct or remove them: `docs/reference/log-format.md`",
+    ),
     "ranges-refused": Kind(
         "warning",
         "the filter refused many ranges as outliers: they are worse than it assumes",

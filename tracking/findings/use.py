@@ -20,10 +20,13 @@ MOST_REFUSED = 0.2
 
 
 def find_unused(log: Log) -> list[Finding]:
-    """Find sensors that are missing or cannot be used."""
+    """Find sensors that are missing or cannot be used, and keys that are not read."""
     block, constellation, found = log.block, log.constellation, list[Finding]()
     kind, node = block.kind[0], block.i[0]
     with_imu = np.unique(node[kind == Kind.IMU])
+    if log.unused_keys:
+        text = f"meta.toml: {', '.join(log.unused_keys)} not read, expected a key of the log format"
+        found.append(Finding("unused-keys", (), text))
     if not np.isin(kind, (Kind.IMU, Kind.STATE)).any():
         text = (
             "no IMU samples and no orientations: ranges alone determine neither the rotation nor "

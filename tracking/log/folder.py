@@ -41,6 +41,8 @@ class Log:
     estimate it."""
     accuracy: float | None = None
     """[m] Expected error up to which a pair is ok; None takes that of its vehicles."""
+    unused_keys: tuple[str, ...] = ()
+    """Keys of its meta.toml that are not read."""
     skipped: dict[str, int] = field(default_factory=dict)
     """Number of bad measurements left out while reading, per file."""
 

@@ -22,6 +22,14 @@ LEAST_NOISE, MOST_NOISE = 1e-3, 10.0
 """[m] Limits of the white noise of ranges; beyond, the unit is wrong."""
 LEAST_ACCURACY, MOST_ACCURACY = 0.01, 10.0
 """[m] Accuracies that can be asked for."""
+TOP = ("format", "name", "source", "licence", "dimensions", "heading", "range_noise_m",
+       "accuracy_m", "nodes", "antennas")  # fmt: skip
+"""Keys above the tables."""
+TABLES = {
+    "nodes": ("kind", "vehicle", "initial_heading_rad", "mount", "imu_axes", "mag_axes"),
+    "antennas": ("node", "offset_m"),
+}
+"""Keys of the tables of each node and antenna."""
 MAX_OFFSET = 100.0
 """[m] Largest offset of an antenna from its body's origin; beyond, the unit is wrong."""
 
@@ -38,6 +46,8 @@ class Meta:
     """[m] As `Log.range_noise`."""
     accuracy: float | None = None
     """[m] As of `Log.accuracy`."""
+    unused_keys: tuple[str, ...] = ()
+    """Keys that are not read, with their tables."""
 
 
 def read_meta(path: Path) -> Meta:
@@ -80,7 +90,17 @@ def read_meta(path: Path) -> Meta:
         constellation=constellation,
         range_noise=_within("range_noise_m", raw, LEAST_NOISE, MOST_NOISE),
         accuracy=_within("accuracy_m", raw, LEAST_ACCURACY, MOST_ACCURACY),
+        unused_keys=_unused_keys(raw),
     )
+
+
+def _unused_keys(raw: dict[str, Any]) -> tuple[str, ...]:
+    """Return the keys that are not read, such as misspelt ones."""
+    found = [key for key in raw if key not in TOP]
+    for name, known in TABLES.items():
+        for number, table in raw.get(name, {}).items():
+            found += [f"{name}.{number}.{key}" for key in table if key not in known]
+    return tuple(found)
 
 
 def write_range_noise(folder: Path | str, noise: float) -> None:

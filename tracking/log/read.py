@@ -70,6 +70,7 @@ def read_log(folder: Path | str) -> Log:
         nlos=nlos,
         range_noise=meta.range_noise,
         accuracy=meta.accuracy,
+        unused_keys=meta.unused_keys,
         skipped={name: n for name, n in skipped.items() if n},
     )
 
