@@ -27,6 +27,7 @@ from agents.training.evaluation import Evaluation
 from agents.training.ppo.learner import level_of, make_model, make_policy, run_interval
 from agents.training.progress import Progress
 from agents.training.run_folder import RunFolder, restore, tensors_of
+from relpos_env.errors import EnvError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,8 +88,9 @@ def train(
         with run.writing():
             try:
                 run_interval(learner.model, config, state.n_intervals, tell)
-            except ValueError as error:
-                # torch raises ValueError for distributions with NaN parameters.
+            except (ValueError, EnvError) as error:
+                # torch raises ValueError for distributions with NaN parameters, unless a library
+                # has switched its checks off; then the actions are NaN.
                 if all(bool(p.isfinite().all()) for p in learner.model.policy.parameters()):
                     raise
                 raise UsageError(

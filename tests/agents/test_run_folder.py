@@ -66,7 +66,10 @@ def test_what_a_kill_left_of_the_first_file_is_in_nobodys_way(tmp_path):
     assert RunFolder(tmp_path).config() == small()
 
 
-def test_weights_that_are_no_numbers_any_more_are_told(tmp_path):
+@pytest.mark.parametrize("checks", [True, False])
+def test_weights_that_are_no_numbers_any_more_are_reported(tmp_path, monkeypatch, checks):
+    # TorchRL switches the checks of distributions off for a whole process.
+    monkeypatch.setattr(torch.distributions.Distribution, "_validate_args", checks)
     with pytest.raises(UsageError, match=r"diverged in interval \d.*--learning-rate"):
         train(small(learning_rate="1", entropy="1", epochs="20"), tmp_path / "run")
 
