@@ -24,9 +24,13 @@ LONGEST = 600.0
 
 def main(programs: Path) -> int:
     """Run all blocks; return the exit status of the first that fails, or 0."""
+    blocks = BLOCK.findall(README.read_text())
+    if len(blocks) < 4:
+        print(f"expected four blocks of code and more, found {len(blocks)}")
+        return 1
     path = f"{programs.resolve()}{os.pathsep}{os.environ['PATH']}"
     with tempfile.TemporaryDirectory() as folder:
-        for language, code in BLOCK.findall(README.read_text()):
+        for language, code in blocks:
             lines = [line for line in code.splitlines() if not INSTALLS.match(line)]
             text = "\n".join(lines)
             # What a block leaves in the background ends with it.

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from agents.errors import UsageError
+from tracking.errors import LogError
 from tracking.log.meta import Meta, read_meta
 from tracking.params.tables import TableReader, Where
 
@@ -161,7 +162,12 @@ def read_plan(preset: str | None, file: Path | None) -> Plan:
     if preset is not None and preset not in PRESETS:
         raise UsageError(f"--preset: expected one of {', '.join(PRESETS)}, got {preset!r}")
     path = FOLDER / f"{preset}.toml" if file is None else file
-    meta = read_meta(path)
+    if not path.is_file():
+        raise UsageError(f"--mapping: no such file, got {path}")
+    try:
+        meta = read_meta(path)
+    except LogError as error:
+        raise UsageError(str(error).replace("meta.toml", path.name, 1)) from error
     raw = tomllib.loads(path.read_text(encoding="utf-8"))
     ids, places = raw.pop("ids", {}), raw.pop("places", {})
     rest = {key: value for key, value in raw.items() if key not in OF_META}

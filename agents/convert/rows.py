@@ -47,8 +47,9 @@ def read_rows(
                 rows.append([t, *row])
         except KeyError as error:
             raise UsageError(f"stream {record.stream!r}: no field {error.args[0]!r}") from error
-        except UsageError as error:
-            raise UsageError(f"stream {record.stream!r}: {error}") from error
+        except (UsageError, TypeError, ValueError) as error:
+            where = f"stream {record.stream!r}, record {record.k + 1}"
+            raise UsageError(f"{where}: {error}") from error
     found = np.array(rows, dtype=np.float64)
     if not len(found):
         return found
@@ -156,7 +157,12 @@ def _numbers(get: Get, item: Item, key: str, n: int) -> list[float]:
 
 
 def _number(value: Any) -> float:
-    return float(value) if value != "" else float("nan")
+    if value == "":
+        return float("nan")
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise UsageError(f"expected a number, found {str(value)[:40]!r}") from None
 
 
 def _orientation(get: Get, item: State | Truth) -> list[float]:

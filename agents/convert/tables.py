@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import io
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -41,11 +42,24 @@ class Tables:
         """Yield rows, file after file."""
         for name in names:
             path = self._files[name]
-            data = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
-            for k, row in enumerate(csv.DictReader(io.StringIO(data.decode("utf-8-sig")))):
+            try:
+                data = path.read_bytes()
+                text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode("utf-8-sig")
+            except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+                raise UsageError(f"{path.name}: cannot be read ({error})") from error
+            for k, row in enumerate(csv.DictReader(io.StringIO(text))):
+                where = f"{path.name} row {k + 2}"
                 if self._time and self._time not in row:
                     raise UsageError(f"{path.name}: no column {self._time!r}, found {[*row]}")
-                t = float(row[self._time] or "nan") if self._time else float("nan")
+                if None in row.values() or None in row:
+                    raise UsageError(f"{where}: expected as many fields as the first row has")
+                try:
+                    t = float(row[self._time] or "nan") if self._time else float("nan")
+                except ValueError:
+                    found = row[self._time]
+                    raise UsageError(
+                        f"{where}, {self._time}: expected a number, found {found!r}"
+                    ) from None
                 yield Record(name, k, t, row.__getitem__)
 
     def close(self) -> None:

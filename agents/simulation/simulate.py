@@ -68,6 +68,10 @@ def simulate(
     elif cars is not None:
         if not 2 <= cars <= MOST_CARS:
             raise EnvError(f"cars: expected 2 to {MOST_CARS}, got {cars}")
+        drawn = chosen.randomisation.n_cars
+        most = min(chosen.n_cars_range[1], drawn[1] if drawn else MOST_CARS)
+        if cars > most:
+            raise EnvError(f"cars: expected at most {most} in scenario {scenario!r}, got {cars}")
         chosen = chosen.with_cars(cars)
     log = record(chosen, seconds=seconds, seed=seed, progress=progress)
     if channel is not None or antenna_delay is not None:

@@ -14,7 +14,9 @@ from torchrl.envs import EnvBase
 from relpos_env.api.state_space import state_space, truth_inside
 from relpos_env.config import configure, whole_number
 from relpos_env.core.env_core import MOST_ENVS, EnvCore
+from relpos_env.errors import EnvError
 from relpos_env.interface.observations import space_of
+from relpos_env.interface.observations.base import F32
 from relpos_env.interface.seeding import episode_rng, seeds_of_batch
 
 AGENTS = "agents"
@@ -26,12 +28,13 @@ class FormationTorchEnv(EnvBase):  # type: ignore[misc]
 
     Keys, shapes after (env):
 
-        agents/observation    (car, size), zeros for absent cars
+        agents/observation    (car, size), zeros for absent cars; the last one in the step in which
+                              a car leaves for good
         agents/mask           (car), True for cars that participate; the others have no effect
         agents/action         (car, 2) in [-1, 1], or (car) for discrete actions
         agents/reward         (car, 1), zeros for absent cars
-        agents/done, terminated, truncated    (car, 1): over for this car, which has left for good,
-                              or for its environment
+        agents/done, terminated, truncated    (car, 1): over for this car, which leaves for good in
+                              this step, or for its environment
         done, terminated, truncated           (1): the episode of the environment is over
         state                 (8 car), true state for critics, see `state_space`
 
@@ -57,7 +60,7 @@ class FormationTorchEnv(EnvBase):  # type: ignore[misc]
         self.formation = EnvCore(self._parts, n, threads)
         self._truth_space = state_space(self._parts)
         self._seeds: list[int | None] = [None] * n
-        self._are_seeded = False
+        self._are_seeded = np.zeros(n, dtype=bool)
         super().__init__(device=torch.device("cpu"), batch_size=torch.Size([n]))
         self._make_specs()
 
@@ -111,22 +114,26 @@ class FormationTorchEnv(EnvBase):  # type: ignore[misc]
         )
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
-        asked = None if tensordict is None else tensordict.get("_reset", None)
         which = np.arange(self.formation.n_envs)
-        if asked is not None:
-            which = np.flatnonzero(asked.numpy().reshape(len(which), -1).any(axis=1))
+        for key in ("_reset", (AGENTS, "_reset")):
+            asked = None if tensordict is None else tensordict.get(key, None)
+            if asked is not None:
+                which = np.flatnonzero(asked.numpy().reshape(self.formation.n_envs, -1).any(axis=1))
+                break
         for env in which.tolist():
-            if self._seeds[env] is not None or not self._are_seeded:
+            if self._seeds[env] is not None or not self._are_seeded[env]:
                 self.formation.seed(env, episode_rng(self._seeds[env]))
-                self._seeds[env] = None
-        self._are_seeded = True
+                self._seeds[env], self._are_seeded[env] = None, True
         self.formation.begin(which.tolist())
-        return self._observe(self._done())
+        return self._observe(self._done(), self.formation.team_observations())
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
-        actions = tensordict[AGENTS, "action"].numpy()
+        if not self._are_seeded.all():
+            raise EnvError("the environment must be reset first")
+        actions = tensordict[AGENTS, "action"].detach().numpy()
         self.formation.step(*self._parts.actions.decode(actions, "actions"))
-        found = self._observe(self._done())
+        # With the last observations of cars that leave, from which estimators bootstrap.
+        found = self._observe(self._done(), self.formation.observations.copy())
         rewards = torch.from_numpy(self.formation.rewards.astype(np.float32))
         found[AGENTS, "reward"] = rewards.unsqueeze(-1)
         return found
@@ -134,11 +141,11 @@ class FormationTorchEnv(EnvBase):  # type: ignore[misc]
     def _set_seed(self, seed: int | None) -> None:
         self._seeds = seeds_of_batch(seed, self.formation.n_envs)
 
-    def _observe(self, done: TensorDict) -> TensorDict:
+    def _observe(self, done: TensorDict, observations: F32) -> TensorDict:
         """Return observations, masks and the true state, added to the flags."""
         f = self.formation
-        observations = f.team_observations().reshape(f.n_envs, self.n_cars, -1)
-        done[AGENTS, "observation"] = torch.from_numpy(observations)
+        rows = observations.reshape(f.n_envs, self.n_cars, -1)
+        done[AGENTS, "observation"] = torch.from_numpy(rows)
         done[AGENTS, "mask"] = torch.from_numpy(f.active.copy())
         done["state"] = torch.from_numpy(truth_inside(f.state, self._truth_space))
         return done

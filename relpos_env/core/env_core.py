@@ -1,7 +1,7 @@
 """Batch of environments without an interface: rooms, trackers, operator, task, observations.
 
-The PettingZoo, Gymnasium and Stable-Baselines3 environments are thin wrappers of this one, so
-they cannot differ.
+The PettingZoo, Gymnasium, Stable-Baselines3 and TorchRL environments are thin wrappers of this
+one, so they cannot differ.
 """
 
 from __future__ import annotations

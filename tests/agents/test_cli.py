@@ -180,6 +180,10 @@ FAULTS = [
     (["track", "."], "no meta.toml"),
     (["simulate", "--out", "x", "--scenario", "moon"], "scenario: expected one of"),
     (["simulate", "--out", "x", "--cars", "1"], "cars: expected 2 to 20"),
+    (
+        ["simulate", "--out", "x", "--scenario", "swarm-nlos", "--cars", "7"],
+        "at most 6 in scenario",
+    ),
     (["simulate", "--out", "x", "--cars", "19"], "n_cars: 19 do not fit"),
     (["simulate", "--out", "x", "--scenario", "moon.toml"], "scenario: cannot read 'moon.toml'"),
     (["simulate", "--out", "x", "--seconds", "nan"], "seconds: expected 3 to 86400"),

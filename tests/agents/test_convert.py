@@ -200,6 +200,36 @@ def test_what_makes_no_sense_is_refused_by_name(folder, change, message):
     assert not (folder / "log").exists()
 
 
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda text: text.replace(b"2500", b"abc"), "stream 'uwb', record 2: .*found 'abc'"),
+        (lambda text: text + b"1.7e9,1\n", "uwb.csv row 7: expected as many fields"),
+        (lambda text: text + b"\xff\xfe\x00\n", "uwb.csv: cannot be read"),
+        (
+            lambda text: text + b"soon,1,2,3,1\n",
+            "uwb.csv row 7, t: expected a number, found 'soon'",
+        ),
+    ],
+)
+def test_damaged_tables_are_refused_by_file_and_row(folder, damage, message):
+    file = folder / "tables" / "uwb.csv"
+    file.write_bytes(damage(file.read_bytes()))
+    with pytest.raises(UsageError, match=message):
+        convert(folder / "tables", folder / "log", mapping=folder / "map.toml")
+    assert not (folder / "log").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [(None, "no such file"), ("format = [", "made.toml: not TOML")]
+)
+def test_mappings_that_cannot_be_read_are_named(folder, text, message):
+    if text is not None:
+        (folder / "made.toml").write_text(text)
+    with pytest.raises(UsageError, match=message):
+        convert(folder / "tables", folder / "log", mapping=folder / "made.toml")
+
+
 def test_a_minus_turns_an_axis_and_nodes_without_measurements_are_left_out(folder):
     path = folder / "map.toml"
     text = path.read_text().replace('["gx", "gy", "gz"]', '["gy", "-gx", "gz"]')

@@ -48,7 +48,7 @@ def in_g(log, node):
 def test_nothing_is_found_in_a_right_swarm(log):
     running = Checks(log.name, log.constellation, None)
     try:
-        assert [f for f in feed(running, log) if f.severity != "note"] == []
+        assert feed(running, log) == running.findings == []
     finally:
         running.close()
 
@@ -62,9 +62,10 @@ def test_a_wrong_unit_is_reported_once_while_the_swarm_runs(log):
     finally:
         running.close()
     node = log.constellation.ids[1]
-    assert ("accel-units", (node,)) in [(f.name, f.nodes) for f in first]
+    assert [(f.name, f.nodes) for f in running.findings] == [("accel-units", (node,))]
+    (text,) = first
+    assert "they seem to be in g" in text
     assert again == []
-    assert running.findings == first
 
 
 def test_a_check_that_fails_ends_the_checks_and_not_the_run(log, monkeypatch):
@@ -72,12 +73,25 @@ def test_a_check_that_fails_ends_the_checks_and_not_the_run(log, monkeypatch):
     monkeypatch.setattr(checks.pickle, "dumps", lambda log: nonsense)
     running = Checks(log.name, log.constellation, None)
     try:
-        assert feed(running, log) == []
+        (text,) = feed(running, log)
+        assert text.startswith("measurements are no longer checked")
         running._due = 0.0
         assert wait(running, log.duration) == []
-        assert running._is_over
     finally:
         running.close()
+
+
+def test_a_full_disk_ends_the_checks_and_not_the_run(log, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(checks.Path, "write_bytes", full)
+    running = Checks(log.name, log.constellation, None)
+    try:
+        (text,) = feed(running, log)
+    finally:
+        running.close()
+    assert "No space left" in text
 
 
 def test_too_few_ranges_are_not_checked(log):

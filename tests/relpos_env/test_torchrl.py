@@ -8,6 +8,7 @@ pytest.importorskip("torch")
 pytest.importorskip("torchrl")
 
 import torch
+from tensordict.nn import TensorDictModule
 from torchrl.envs.utils import check_env_specs
 
 from relpos_env.api.sb3_vec_env import FormationVecEnv
@@ -53,16 +54,20 @@ def test_it_has_the_episodes_of_the_stable_baselines_form(kwargs):
     seen, found, rng, n = twin.reset(), env.reset(), np.random.default_rng(7), 2 * env.n_cars
     n_left = 0
     for _ in range(100):
-        assert bits(rows(found["agents", "observation"], n)) == bits(seen)
+        seated = twin.active  # a car that has just left still has its last observation
+        assert bits(rows(found["agents", "observation"], n)[seated]) == bits(seen[seated])
         assert bits(rows(found["agents", "mask"], n)) == bits(twin.active)
         actions = rng.integers(15, size=n) if "actions" in kwargs else rng.uniform(-1, 1, (n, 2))
         actions = actions if "actions" in kwargs else actions.astype(np.float32)
         shape = (2, env.n_cars, *actions.shape[1:])
         found["agents", "action"] = torch.from_numpy(actions.reshape(shape))
-        seen, rewards, dones, _ = twin.step(actions)
+        seen, rewards, dones, infos = twin.step(actions)
         over, found = env.step_and_maybe_reset(found)
         assert bits(rows(over["next", "agents", "reward"], n)[:, 0]) == bits(rewards)
         assert bits(rows(over["next", "agents", "done"], n)[:, 0]) == bits(dones)
+        last = rows(over["next", "agents", "observation"], n)
+        for row in np.flatnonzero(dones):
+            assert bits(last[row]) == bits(infos[row]["terminal_observation"])
         of_car = over["next", "agents", "done"].all(dim=1)
         assert torch.equal(of_car, over["next", "done"]) or not of_car.any()
         n_left += int((over["next", "agents", "done"] & ~over["next", "done"][:, None]).sum())
@@ -78,6 +83,30 @@ def test_only_environments_in_the_mask_are_reset():
     same = (after["agents", "observation"] == before["agents", "observation"]).flatten(1).all(dim=1)
     assert same.tolist() == [True, False, True]
     assert env.formation.cycles.tolist() == [10, 0, 10]
+
+
+def test_a_mask_of_cars_resets_their_environments():
+    env = FormationTorchEnv(3, max_cycles=50)
+    mask = torch.zeros(3, env.n_cars, 1, dtype=torch.bool)
+    mask[1, 0] = True
+    before = env.rollout(5)[:, -1]["next"].clone()
+    before["agents", "_reset"] = mask
+    env._reset(before)
+    assert env.formation.cycles.tolist() == [5, 0, 5]
+
+
+def test_a_network_drives_while_gradients_are_recorded():
+    env = FormationTorchEnv(2, max_cycles=8)
+    size = env.observation_spec["agents", "observation"].shape[-1]
+    keys = [("agents", "observation")], [("agents", "action")]
+    policy = TensorDictModule(torch.nn.Linear(size, 2), *keys)
+    assert env.rollout(4, policy=policy)["agents", "action"].requires_grad
+
+
+def test_a_step_before_the_first_reset_is_refused():
+    env = FormationTorchEnv(2)
+    with pytest.raises(EnvError, match="must be reset first"):
+        env._step(env.rand_action())
 
 
 def test_same_seed_same_rollout():

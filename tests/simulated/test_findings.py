@@ -180,6 +180,8 @@ def test_a_magnetometer_that_is_turned_is_turned_back(drive, node, degrees):
     wrong = replace(drive, block=turned(drive.block, node, np.radians(degrees)))
     corrected, (found,) = examine(wrong)
     assert (found.name, found.nodes) == ("mag-turned", (drive.constellation.ids[node],))
+    # Readings that are turned to the left are those of a sensor that is turned to the right.
+    assert f"to the {'right' if degrees > 0.0 else 'left'} by about" in found.text
     t, before, after = (log.block.t[0] for log in (drive, wrong, corrected))
     np.testing.assert_array_equal(t, before)
     np.testing.assert_array_equal(t, after)

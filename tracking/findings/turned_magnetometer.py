@@ -26,7 +26,7 @@ from tracking.log.folder import Log
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.vehicles import VEHICLES
 
-TURNS = np.radians([-60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0])
+TURNS = np.radians([-80.0, -60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 80.0])
 """[rad] Trial turns of each magnetometer."""
 LEAST_GAIN = 0.01
 """[-] Least gain in log-likelihood of a range."""
@@ -49,7 +49,8 @@ def correct_magnetometers(log: Log, progress: Progress) -> tuple[Log, list[Findi
         The log with the corrections, and the findings.
     """
     group = log.constellation
-    measured = np.unique(log.block.i[0, log.block.kind[0] == Kind.MAG]).tolist()
+    kind, node = log.block.kind[0], log.block.i[0]
+    measured = np.intersect1d(node[kind == Kind.MAG], node[kind == Kind.IMU]).tolist()
     if group.n_nodes < 3 or len(measured) > MOST_NODES or group.heading != "magnetic":
         return log, []
     left = [n for n in measured if VEHICLES[group.nodes[n].vehicle].levelled]
@@ -60,10 +61,13 @@ def correct_magnetometers(log: Log, progress: Progress) -> tuple[Log, list[Findi
         n, turn = left[int(np.argmax(gains))], tried[int(np.argmax(gains))]
         if turn is None:
             break
-        node, way = group.ids[n], "left" if turn.at > 0.0 else "right"
-        angle = f"about {abs(np.degrees(turn.at)):.0f} degrees"
-        text = f"node {node}: its magnetometer is turned to the {way} by {angle}, corrected"
-        found.append(Finding("mag-turned", (node,), text))
+        own, way = group.ids[n], "left" if turn.at > 0.0 else "right"
+        said = f"node {own}: against those of the others its magnetometer is turned to the {way} by"
+        angle = f"{abs(np.degrees(turn.at)):.0f} degrees"
+        if not turn.is_within:
+            found.append(Finding("imu-contradicts", (own,), f"{said} {angle} or more"))
+            break
+        found.append(Finding("mag-turned", (own,), f"{said} about {angle}, corrected"))
         log = replace(log, block=turned(log.block, n, turn.at))
         left.remove(n)
     return log, found
@@ -81,7 +85,10 @@ def _turn(log: Log, n: int) -> Explained | None:
 
 
 def turned(block: MeasurementBlock, n: int, turn: float) -> MeasurementBlock:
-    """Return a block with the readings of a magnetometer that is turned to the left [rad]."""
+    """Return a block with the readings of a magnetometer turned to the left [rad].
+
+    A magnetometer that is turned to the right reads such a field.
+    """
     rows = np.flatnonzero(of_nodes(block, (n,)) & (block.kind[0] == Kind.MAG))
     values, (c, s) = block.values.copy(), (np.cos(turn), np.sin(turn))
     x, y = block.values[0, rows, 0], block.values[0, rows, 1]

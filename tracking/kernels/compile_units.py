@@ -159,7 +159,7 @@ class _UnitCompiler(Compiler):  # type: ignore[misc]
             library.key = (func.__module__, func.__qualname__), tuple(self.state.args)
             _UnitCompiler.n_compiled += 1
             if _UnitCompiler.n_compiled == MANY:
-                _log.warning("compiling, once, for up to a minute; `relpos warmup` does it ahead")
+                _log.warning("compiling, once, for a minute or two; `relpos warmup` does it ahead")
         self.state.func_id = identity = FunctionIdentity.from_function(func)
         kernel = _kernels.get((func.__module__, func.__qualname__))
         if kernel is not None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -91,7 +92,7 @@ def track(
     from tracking.filters.joint.params import JointParams
     from tracking.filters.params import FilterParams
     from tracking.findings import refuse_errors
-    from tracking.log import read_log, write_range_noise
+    from tracking.log import write_range_noise
     from tracking.metrics.bound import recorded_bound
     from tracking.tracker import TrackerParams
 
@@ -100,18 +101,17 @@ def track(
     names = tuple(dict.fromkeys(filters)) or (DEFAULT_FILTER,)
     for name in names:
         filter_builder(name)
-    if smooth and names != ("joint",):
-        raise UsageError(f"--smooth: expected filter joint alone, not {', '.join(names)}")
-    if write_noise and (smooth or DEFAULT_FILTER not in names):
-        raise UsageError("--write-noise: expected filter joint without --smooth")
+    _check_filters(names, smooth, accuracy, write_noise)
     if out is not None:
         check_folder(out, ["report.html"])
-    read = [apply_calibrations(read_log(path), calibrations) for path in logs]
+    read = [apply_calibrations(_read(path), calibrations) for path in logs]
     needed = names if no_checks else (*names, DEFAULT_FILTER)
     warm_up_first(needed, in_space=any(log.constellation.dimensions == 3 for log in read))
     results: list[TrackResult] = []
     checked = [(log, []) if no_checks else _examined(log) for log in read]
-    refuse_errors([finding for _, found in checked for finding in found])
+    for path, (_, found) in zip(logs, checked, strict=True):
+        with _named(path):
+            refuse_errors(found)
     for log, found in checked:
         expected = recorded_bound(log, skip=skip) if bound else None
         for name in names:
@@ -142,7 +142,41 @@ def track(
         return
     print_tracks(results)
     if out is not None:
-        click.echo(f"\nwritten: {out / 'report.html'} and estimates.csv")
+        where = "estimates.csv" if len(results) == 1 else "estimates.csv in a folder for each row"
+        click.echo(f"\nwritten: {out / 'report.html'} and {where}")
+
+
+def _read(path: Path) -> Log:
+    from tracking.log import read_log
+
+    with _named(path):
+        return read_log(path)
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Name the folder of a log in errors about it, line by line."""
+    from tracking.errors import LogError
+
+    try:
+        yield
+    except LogError as error:
+        rows = str(error).split("\n")
+        lines = (row if row.startswith(f"{path}") else f"{path}: {row}" for row in rows)
+        raise LogError("\n".join(lines)) from error
+
+
+def _check_filters(
+    names: tuple[str, ...], smooth: str | None, accuracy: float | None, write_noise: bool
+) -> None:
+    from tracking.filters import DEFAULT_FILTER
+
+    if smooth and names != ("joint",):
+        raise UsageError(f"--smooth: expected filter joint alone, not {', '.join(names)}")
+    if accuracy is not None and DEFAULT_FILTER not in names:
+        raise UsageError(f"--accuracy: expected filter joint, not {', '.join(names)}")
+    if write_noise and (smooth or DEFAULT_FILTER not in names):
+        raise UsageError("--write-noise: expected filter joint without --smooth")
 
 
 def _check_numbers(skip: float, accuracy: float | None) -> None:

@@ -12,11 +12,12 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 
 from tracking.calibration.calibration import Calibration
 from tracking.constellation import Constellation
-from tracking.findings import Finding, examine
+from tracking.findings import KINDS, Finding, examine
 from tracking.log import Log
 from tracking.measurements import Kind, MeasurementBlock
 
@@ -46,10 +47,11 @@ class Checks:
         self._due = PERIOD
         self._is_over = False
         self.findings: list[Finding] = []
-        """All findings, each kind and node once."""
+        """Errors and warnings found, each kind and node once. Notes are about the time before the
+        window, or about what the user has configured."""
 
-    def step(self, now: float, block: MeasurementBlock) -> list[Finding]:
-        """Add measurements, start a check that is due, and return new findings.
+    def step(self, now: float, block: MeasurementBlock) -> list[str]:
+        """Add measurements, start a check that is due, and return new notices.
 
         Args:
             now: Time since the start [s].
@@ -62,7 +64,10 @@ class Checks:
             return self._take_findings(self._process)
         if self._process is None and now >= self._due and not self._is_over:
             self._due = now + PERIOD
-            self._start()
+            try:
+                self._start()
+            except OSError as error:
+                return self._end(str(error))
         return []
 
     def close(self) -> None:
@@ -81,25 +86,36 @@ class Checks:
         log = Log(name=self._name, constellation=self._group, block=block)
         self._file.write_bytes(pickle.dumps(log))
         self._process = subprocess.Popen(
-            [sys.executable, "-m", __name__, str(self._file)],
+            [sys.executable, "-P", "-m", __name__, str(self._file)],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
 
-    def _take_findings(self, process: subprocess.Popen[bytes]) -> list[Finding]:
+    def _take_findings(self, process: subprocess.Popen[bytes]) -> list[str]:
         self._process = None
-        # A check that fails is not repeated: it would fail again, and must not stop the tracking.
-        self._is_over = process.returncode != 0
-        if self._is_over:
-            return []
+        if process.returncode != 0:
+            return self._end(f"status {process.returncode}")
+        try:
+            found: list[Finding] = pickle.loads(self._file.read_bytes())
+        except (OSError, EOFError, pickle.UnpicklingError) as error:
+            return self._end(str(error))
         known = {(f.name, f.nodes) for f in self.findings}
-        found: list[Finding] = pickle.loads(self._file.read_bytes())
-        new = [f for f in found if (f.name, f.nodes) not in known]
-        self.findings += new
-        return new
+        new = [f for f in found if (f.name, f.nodes) not in known and f.severity != "note"]
+        self.findings += [_uncorrected(f) for f in new]
+        return [f"{f.text}: {KINDS[f.name].remedy}" for f in map(_uncorrected, new)]
+
+    def _end(self, why: str) -> list[str]:
+        """End the checks, which would fail again and must not end the run; return the notice."""
+        self._is_over = True
+        return [f"measurements are no longer checked: {why}"]
 
     @property
     def _file(self) -> Path:
         return Path(self._folder.name) / "measurements"
+
+
+def _uncorrected(found: Finding) -> Finding:
+    """Return a finding of a swarm, whose measurements are used as they come."""
+    return replace(found, text=found.text.replace(", corrected", ", not corrected while live"))
 
 
 def check(file: Path) -> None:

@@ -9,7 +9,6 @@ from agents.hardware.live.history import History
 from agents.hardware.live.rates import Rates
 from agents.hardware.live.snapshot import Snapshot, take_snapshot
 from hardware_bridge.live.swarm import LiveSwarm
-from tracking.findings import Finding
 from tracking.measurements import MeasurementBlock
 
 
@@ -39,12 +38,12 @@ class Monitor:
         """[ns] Host time of the last step."""
         self.decisions = 0
         self._estimates, self._measurements, self._checks = estimates, measurements, checks
-        self._found: list[Finding] = []
+        self._found: list[str] = []
         self._blocks: list[MeasurementBlock] = []
         swarm.tap = self._take
 
-    def after_step(self, t_ns: int) -> list[Finding]:
-        """Record a step of the swarm at a host time [ns]; return new findings."""
+    def after_step(self, t_ns: int) -> list[str]:
+        """Record a step of the swarm at a host time [ns]; return notices of its checks."""
         self.t_ns = t_ns
         self.decisions += 1
         self.rates.close(self.swarm.intake.seconds(t_ns))

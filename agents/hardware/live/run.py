@@ -14,7 +14,6 @@ from hardware_bridge.config import SwarmConfig, read_config
 from hardware_bridge.live.bridge import Bridge
 from hardware_bridge.live.feed import LiveFeed
 from hardware_bridge.live.swarm import load_calibration
-from tracking.findings import KINDS
 
 Watch = Callable[[Monitor, list[tuple[float, str]]], bool | None]
 """Callback with the monitor and the new notices, time [s] and text; False ends the run."""
@@ -84,8 +83,8 @@ def _listen(
     while seconds is None or intake.seconds(monitor.t_ns) < seconds:
         t_ns = bridge.feed.advance()
         bridge.swarm.step(t_ns)
-        for found in monitor.after_step(t_ns):
-            bridge.feed.note(t_ns, f"{found.text}: {KINDS[found.name].remedy}")
+        for text in monitor.after_step(t_ns):
+            bridge.feed.note(t_ns, text)
         new = _drain(bridge.feed, monitor)
         notices += new
         if watch is not None and watch(monitor, new) is False:
