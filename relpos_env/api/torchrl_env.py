@@ -26,7 +26,7 @@ AGENTS = "agents"
 class FormationTorchEnv(EnvBase):  # type: ignore[misc]
     """``num_envs`` environments with ``batch_size=[num_envs]``; the cars are the group ``agents``.
 
-    Keys, shapes after (env):
+    Keys, with their shapes after (env)::
 
         agents/observation    (car, size), zeros for absent cars; the last one in the step in which
                               a car leaves for good
