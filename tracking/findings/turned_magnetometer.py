@@ -64,9 +64,6 @@ def correct_magnetometers(log: Log, progress: Progress) -> tuple[Log, list[Findi
         own, way = group.ids[n], "left" if turn.at > 0.0 else "right"
         said = f"node {own}: against those of the others its magnetometer is turned to the {way} by"
         angle = f"{abs(np.degrees(turn.at)):.0f} degrees"
-        if not turn.is_within:
-            found.append(Finding("imu-contradicts", (own,), f"{said} {angle} or more"))
-            break
         found.append(Finding("mag-turned", (own,), f"{said} about {angle}, corrected"))
         log = replace(log, block=turned(log.block, n, turn.at))
         left.remove(n)
@@ -74,14 +71,19 @@ def correct_magnetometers(log: Log, progress: Progress) -> tuple[Log, list[Findi
 
 
 def _turn(log: Log, n: int) -> Explained | None:
-    """Estimate the turn of the magnetometer of node n [rad]; None if there is hardly any."""
+    """Estimate the turn of the magnetometer of node n [rad]; None if there is hardly any.
+
+    An optimum at the ends of the trials is none: badly calibrated ranges make such ones likely.
+    """
     block = beginning(log)
 
     def cost(turn: float) -> F64:
         return misfit(log, turned(block, n, turn)).surprise
 
     found = best(cost, TURNS, LEAST_GAIN, most_surprise(log))
-    return None if found is None or abs(found.at) <= NEGLIGIBLE else found
+    if found is None or not found.is_within or abs(found.at) <= NEGLIGIBLE:
+        return None
+    return found
 
 
 def turned(block: MeasurementBlock, n: int, turn: float) -> MeasurementBlock:
