@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -109,9 +109,13 @@ def track(
     warm_up_first(needed, in_space=any(log.constellation.dimensions == 3 for log in read))
     results: list[TrackResult] = []
     checked = [(log, []) if no_checks else _examined(log) for log in read]
-    for path, (_, found) in zip(logs, checked, strict=True):
-        with _named(path):
-            refuse_errors(found)
+    refuse_errors(
+        [
+            replace(one, text=f"{path}: {one.text}")
+            for path, (_, found) in zip(logs, checked, strict=True)
+            for one in found
+        ]
+    )
     for log, found in checked:
         expected = recorded_bound(log, skip=skip) if bound else None
         for name in names:
@@ -147,23 +151,15 @@ def track(
 
 
 def _read(path: Path) -> Log:
+    """Read a log; errors name its folder."""
+    from tracking.errors import LogError
     from tracking.log import read_log
 
-    with _named(path):
-        return read_log(path)
-
-
-@contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """Name the folder of a log in errors about it, line by line."""
-    from tracking.errors import LogError
-
     try:
-        yield
+        return read_log(path)
     except LogError as error:
-        rows = str(error).split("\n")
-        lines = (row if row.startswith(f"{path}") else f"{path}: {row}" for row in rows)
-        raise LogError("\n".join(lines)) from error
+        text = str(error)
+        raise LogError(text if text.startswith(f"{path}") else f"{path}: {text}") from error
 
 
 def _check_filters(
