@@ -25,7 +25,7 @@ from relpos_env.world._car_kernels import (
 )
 from relpos_env.world._contact_kernels import solve
 from tracking.kernels.jit import kernel, small_kernel
-from tracking.maths.angles import cosine_sine
+from tracking.maths.elementary import cosine_sine
 
 MAG, IMU, RANGE = 1, 2, 5
 WAITS, PUSHED, MOVED = 0, 1, 2

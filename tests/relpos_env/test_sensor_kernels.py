@@ -18,7 +18,7 @@ from relpos_env.sensors.odometer import ODOMETER, OdometerSimParams
 from relpos_env.simulation.recorder import quat_from_tilt
 from relpos_env.world.parameter_records import fill_numbers
 from tracking.geometry import GRAVITY, quat_conjugate, quat_from_yaw, quat_multiply, rotate
-from tracking.maths.angles import cosine_sine
+from tracking.maths.elementary import cosine_sine
 from tracking.records import as_records
 
 SEED = np.uint64(7)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tracking.maths.angles import SERIES, cosine_sine
+from tracking.maths.elementary import SERIES, cosine_sine
 
 LIMIT = float(np.sqrt(SERIES))
 

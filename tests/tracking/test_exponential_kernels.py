@@ -6,7 +6,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from tracking.maths.exponentials import LEAST, MOST, exponential, likelihood
+from tracking.maths.elementary import LEAST, MOST, exponential, likelihood
 
 
 @given(st.floats(-700.0, MOST))

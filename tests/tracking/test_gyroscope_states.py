@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from test_joint_kernels import running
 from test_upright import walk
 
-from tracking.filters.joint.ekf import ahrs_feedback as gyroscope
+from tracking.filters.joint.ekf import imu_errors as gyroscope
 from tracking.filters.joint.ekf import propagation
 from tracking.filters.joint.hypotheses.alignment import Alignment
 from tracking.filters.joint.updates.motion_constraints import update_gyro_bias_at_rest

@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from tests.tracking.test_joint_kernels import running
 from tracking.filters.joint.ekf.propagation import predict
-from tracking.filters.joint.updates.nlos_model import (
+from tracking.filters.joint.updates.range_errors import (
     reset_bias_on_transition,
     update_nlos_posterior,
 )

@@ -9,7 +9,7 @@ from tracking.constellation import Constellation, NodeConfig
 from tracking.filters.joint.coefficients import make_coefficients
 from tracking.filters.joint.params import JointParams
 from tracking.filters.joint.records import GROUP, PAIR
-from tracking.filters.joint.updates.range_noise import learn_white_noise
+from tracking.filters.joint.updates.range_errors import learn_white_noise
 
 PLAIN = Constellation(nodes=(NodeConfig(id=1), NodeConfig(id=2)), dimensions=2)
 

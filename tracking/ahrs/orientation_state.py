@@ -11,18 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracking.ahrs.gyro_bias import N_BIAS, UNIT
+from tracking.ahrs.gyro_bias import N_BIAS, N_REST, UNIT
 from tracking.ahrs.lowpass import N_LOW_PASS
 from tracking.ahrs.magnetometer import N_MAGNETIC
 from tracking.ahrs.params import VQF_TAU_ACC, OrientationParams
-from tracking.ahrs.rest import N_REST
 from tracking.ahrs.stage import N_NODE
 from tracking.ahrs.vqf import N_TILT
 from tracking.arrays import F64, Bool
 from tracking.constellation import Constellation
 from tracking.records import Records, record_of
-from tracking.sanity.imu import N_HEALTH
-from tracking.sanity.saturation import N_LIMIT
+from tracking.sanity.imu import N_HEALTH, N_LIMIT
 from tracking.vehicles import VEHICLES
 
 
@@ -93,7 +91,7 @@ class OrientationState(NamedTuple):
     health: F64
     """Memory of `sanity.imu`, (env, node, N_HEALTH)."""
     limits: F64
-    """Memory of `sanity.saturation`, (env, node, N_LIMIT)."""
+    """Memory of `sanity.imu`, (env, node, N_LIMIT)."""
     tilt: F64
     """Rotations of VQF, (env, node, N_TILT)."""
     rest: F64

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 
-from tracking.ahrs.gyro_bias import BIAS, mean_variance, worst_variance
+from tracking.ahrs.gyro_bias import BIAS, RESTING, mean_variance, worst_variance
 from tracking.ahrs.magnetometer import COS, GAIN, SIN
-from tracking.ahrs.rest import RESTING
 from tracking.ahrs.vqf import (
     N_ACC_READ,
     Q_6D,
@@ -23,8 +22,7 @@ from tracking.ahrs.vqf import (
 )
 from tracking.kernels.jit import kernel, small_kernel
 from tracking.measurements import ACCEL_NOISE, AHRS_STATUS, GYRO_BIAS, GYRO_VAR, UPRIGHT
-from tracking.sanity.imu import GOOD, inspect_sample, noise_scale
-from tracking.sanity.saturation import find_limits
+from tracking.sanity.imu import GOOD, find_limits, inspect_sample, noise_scale
 
 # Plain numbers of `Kind`: kernels do not know enums.
 MAG, IMU, STATE = 1, 2, 3

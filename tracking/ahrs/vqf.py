@@ -18,12 +18,20 @@ from __future__ import annotations
 
 import math
 
-from tracking.ahrs.gyro_bias import BIAS, estimate_bias, start_bias
+from tracking.ahrs.gyro_bias import (
+    BIAS,
+    GYR,
+    N_REST,
+    RESTING,
+    estimate_bias,
+    start_bias,
+    watch_accelerometer,
+    watch_gyroscope,
+)
 from tracking.ahrs.lowpass import low_pass
 from tracking.ahrs.magnetometer import COS, SIN, correct_heading, start_magnetic
-from tracking.ahrs.rest import GYR, N_REST, RESTING, watch_accelerometer, watch_gyroscope
 from tracking.kernels.jit import kernel, small_kernel
-from tracking.maths.angles import SERIES, small_turn
+from tracking.maths.elementary import SERIES, small_turn
 
 Q_GYR, Q_ACC, Q_6D, FORCE, N_GYR_READ, N_ACC_READ = 0, 4, 8, 12, 21, 22
 TURN = 23

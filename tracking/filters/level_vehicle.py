@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from tracking.kernels.jit import small_kernel
-from tracking.maths.angles import turn
+from tracking.maths.elementary import turn
 
 GRAVITY = 9.81
 

@@ -22,7 +22,7 @@ from tracking.filters.joint.updates.motion_constraints import (
     constrain_nodes,
     update_gyro_bias_at_rest,
 )
-from tracking.filters.joint.updates.nlos_model import reset_bias_on_transition
+from tracking.filters.joint.updates.range_errors import reset_bias_on_transition
 from tracking.filters.joint.updates.range_update import predict_range
 from tracking.kernels.jit import kernel, small_kernel
 from tracking.models.lever_arm import antenna_offset

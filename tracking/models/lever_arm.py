@@ -9,7 +9,7 @@ the part of the range that the lever arm of its second end adds.
 from __future__ import annotations
 
 from tracking.kernels.jit import small_kernel
-from tracking.maths.angles import cosine_sine, turn
+from tracking.maths.elementary import cosine_sine, turn
 
 
 @small_kernel

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from tracking.kernels.jit import small_kernel
-from tracking.maths.exponentials import exponential
+from tracking.maths.elementary import exponential
 
 SQRT_2PI = math.sqrt(2.0 * math.pi)
 

@@ -27,13 +27,18 @@ from tracking.filters.joint.ekf.workspace import (
 from tracking.filters.joint.estimate import write_estimate
 from tracking.filters.joint.hypotheses.alignment import NONE, STATIC, is_linear
 from tracking.filters.joint.hypotheses.alignment_sensitivity import propagate_sensitivity
-from tracking.filters.joint.hypotheses.bank import flush_all_updates, hypothesis_range
+from tracking.filters.joint.hypotheses.bank import flush_all_updates
 from tracking.filters.joint.hypotheses.initialisation import can_join, can_start
 from tracking.filters.joint.hypotheses.static_initialisation import all_static, may_move
 from tracking.filters.joint.state import one_env
-from tracking.filters.joint.supervision.frozen_range import is_frozen
+from tracking.filters.joint.supervision.missing_ranges import (
+    SAME,
+    is_frozen,
+    is_silent,
+    note_seen,
+    update_interval,
+)
 from tracking.filters.joint.supervision.residuals import update_residuals
-from tracking.filters.joint.supervision.staleness import is_silent, note_seen, update_interval
 from tracking.filters.joint.supervision.supervise import supervise
 from tracking.filters.joint.updates.motion_constraints import (
     apply_motion_constraints,
@@ -42,14 +47,12 @@ from tracking.filters.joint.updates.motion_constraints import (
 from tracking.filters.joint.updates.range_update import range_update
 from tracking.filters.joint.updates.surveyed_distance import surveyed_distance_update
 from tracking.kernels.addresses import by_reference
-from tracking.kernels.jit import kernel
+from tracking.kernels.jit import kernel, small_kernel
 from tracking.models.lever_arm import antenna_offset
 from tracking.models.nlos import power_evidence
 
 # Plain numbers of `Kind`: kernels do not know enums.
 STATE, SURVEY, RANGE, LEAVE = 3, 4, 5, 6
-SAME = 1e-5
-"""[s] Ranges of one message differ in time by rounding only: they share a prediction."""
 
 
 @kernel
@@ -164,6 +167,15 @@ def process_range(c, s, layout, work, i, j, a_i, a_j, t, distance, sight, is_sur
         update_range(c, s, layout, work, p, a_i, a_j, t, distance, sight, is_survey)
         return NOTHING
     return collect_initial_range(c, s, layout, work, i, j, p, t, distance, sight, is_survey)
+
+
+@small_kernel
+def hypothesis_range(s):
+    """Return first and end index of the hypotheses to loop over: all, or the only one."""
+    group = s.group[0]
+    if group.n_alive > 1:
+        return 0, s.alive.shape[0]
+    return group.best, group.best + 1
 
 
 @kernel

@@ -25,7 +25,7 @@ from tracking.filters.joint.hypotheses.initialisation import join, start
 from tracking.filters.joint.hypotheses.static_initialisation import spawn_rotation_hypotheses
 from tracking.filters.joint.state import one_env
 from tracking.filters.joint.supervision.actions import reinitialise_node
-from tracking.filters.joint.supervision.staleness import drop_stale
+from tracking.filters.joint.supervision.missing_ranges import drop_stale
 from tracking.filters.joint.updates.surveyed_distance import apply_surveys
 from tracking.kernels.addresses import by_reference
 from tracking.kernels.jit import Call, bind, kernel

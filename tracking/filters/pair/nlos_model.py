@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from tracking.kernels.jit import small_kernel
-from tracking.maths.exponentials import decay, exponential, likelihood
+from tracking.maths.elementary import decay, exponential, likelihood
 from tracking.models.nlos import nlos_posterior, outlier_density, transition_probs
 from tracking.models.range_bias import slow_error_var
 

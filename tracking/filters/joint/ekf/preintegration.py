@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-from tracking.filters.joint.ekf.ahrs_feedback import process_tilt_correction
 from tracking.filters.joint.ekf.columns import (
     BIAS_P,
     BIAS_V,
@@ -19,9 +18,10 @@ from tracking.filters.joint.ekf.columns import (
     ROTATION_P,
     ROTATION_V,
 )
+from tracking.filters.joint.ekf.imu_errors import process_tilt_correction
 from tracking.filters.level_vehicle import angle_between, direction, level
 from tracking.kernels.jit import small_kernel
-from tracking.maths.exponentials import decay
+from tracking.maths.elementary import decay
 from tracking.measurements import ACCEL_NOISE
 
 

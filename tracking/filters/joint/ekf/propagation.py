@@ -5,7 +5,7 @@ that rotates with the body by ``B``, ``Bv = int B``, ``Bp = int int B`` (`preint
 
     p += T v + R dp - R Bp b,    v += R dv - R Bv b,    R = rotation by the heading error
 
-exactly, for every hypothesis at once, at hardly any cost per sample. `attitude_coupling` has the
+exactly, for every hypothesis at once, at hardly any cost per sample. `imu_errors` has the
 terms of bodies that rotate about all axes. Bias, heading error and range errors decay (first-order
 Markov): the first two with time, range errors with the distance both ends travel, so that they stay
 while no node moves.
@@ -15,19 +15,6 @@ from __future__ import annotations
 
 import math
 
-from tracking.filters.joint.ekf.ahrs_feedback import (
-    apply_tilt_correction,
-    decay_gyro_bias_transition,
-    propagate_gyro_bias_columns,
-    propagate_gyro_bias_rows,
-    tilt_bias_tau,
-)
-from tracking.filters.joint.ekf.attitude_coupling import (
-    PER_GRAVITY,
-    corrected_increments,
-    write_accel_bias_jacobian,
-    write_attitude_coupling,
-)
 from tracking.filters.joint.ekf.columns import (
     BIAS_P,
     BIAS_V,
@@ -43,10 +30,20 @@ from tracking.filters.joint.ekf.columns import (
     UP_P,
     UP_V,
 )
+from tracking.filters.joint.ekf.imu_errors import (
+    PER_GRAVITY,
+    apply_tilt_correction,
+    corrected_increments,
+    decay_gyro_bias_transition,
+    propagate_gyro_bias_columns,
+    propagate_gyro_bias_rows,
+    tilt_bias_tau,
+    write_accel_bias_jacobian,
+    write_attitude_coupling,
+)
 from tracking.kernels.jit import kernel, small_kernel
-from tracking.maths.angles import cosine_sine, turn
 from tracking.maths.covariance import STATES, add_to_columns, add_to_rows, apply_downdate, mirror
-from tracking.maths.exponentials import decay
+from tracking.maths.elementary import cosine_sine, decay, turn
 
 
 @kernel

@@ -22,8 +22,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.filters.joint.ekf.ahrs_feedback import propagate_gyro_bias_sensitivity
 from tracking.filters.joint.ekf.columns import BY_HEADING_P, BY_HEADING_V, TILT_STEP, UP_P, UP_V
+from tracking.filters.joint.ekf.imu_errors import propagate_gyro_bias_sensitivity
 from tracking.filters.joint.ekf.propagation import moves, n_bias_states
 from tracking.filters.joint.hypotheses.alignment import LINEAR, has_modes
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel

@@ -20,8 +20,8 @@ import numpy as np
 
 from tracking.filters.best_hypothesis import choose_best
 from tracking.filters.first_ranges import forget_first
-from tracking.filters.joint.ekf.ahrs_feedback import last_state
 from tracking.filters.joint.ekf.gauge import heading_functional
+from tracking.filters.joint.ekf.imu_errors import last_state
 from tracking.filters.joint.ekf.observability import shift_nullspace
 from tracking.filters.joint.ekf.scalar_update import flush_updates, reset_state
 from tracking.filters.joint.hypotheses.alignment import (
@@ -44,15 +44,6 @@ from tracking.filters.joint.hypotheses.merging import are_same, rotation_between
 from tracking.filters.joint.hypotheses.static_initialisation import TIE, spawn_rotations
 from tracking.filters.joint.supervision.residuals import reset_residuals
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
-
-
-@small_kernel
-def hypothesis_range(s):
-    """Return first and end index of the hypotheses to loop over: all, or the only one."""
-    group = s.group[0]
-    if group.n_alive > 1:
-        return 0, s.alive.shape[0]
-    return group.best, group.best + 1
 
 
 @small_kernel

@@ -37,7 +37,7 @@ from tracking.filters.joint.hypotheses.static_initialisation import (
 )
 from tracking.filters.joint.supervision.residuals import reset_residuals
 from tracking.kernels.jit import allocating_kernel, kernel
-from tracking.maths.exponentials import decay
+from tracking.maths.elementary import decay
 from tracking.maths.multilateration import best_positions
 from tracking.models.range_bias import slow_error_var
 

@@ -23,7 +23,7 @@ from tracking.filters.joint.supervision.residuals import (
     others_fit,
 )
 from tracking.kernels.jit import kernel
-from tracking.maths.exponentials import decay
+from tracking.maths.elementary import decay
 from tracking.maths.multilateration import misfit
 
 

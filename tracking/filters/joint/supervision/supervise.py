@@ -30,7 +30,7 @@ from tracking.filters.joint.supervision.faults import (
     find_fault,
     update_group_misfit,
 )
-from tracking.filters.joint.supervision.staleness import is_silent
+from tracking.filters.joint.supervision.missing_ranges import is_silent
 from tracking.kernels.jit import kernel, small_kernel
 
 

@@ -13,7 +13,7 @@ from tracking.filters.joint.hypotheses.alignment_sensitivity import (
 )
 from tracking.filters.joint.hypotheses.static_initialisation import is_at_rest
 from tracking.kernels.jit import kernel, small_kernel
-from tracking.maths.angles import turn
+from tracking.maths.elementary import turn
 from tracking.models.mean_velocity import mean_velocity_model
 from tracking.models.nonholonomic import nonholonomic_model
 from tracking.models.zero_velocity import zero_velocity_model
@@ -61,7 +61,7 @@ def constrain_nodes(c, s, h, t, work):
 
 @small_kernel
 def update_gyro_bias_at_rest(s, h, i, work):
-    """Correct hypothesis h with the gyroscope bias that VQF learned at rest (`ahrs_feedback`)."""
+    """Correct hypothesis h with the gyroscope bias that VQF learned at rest (`imu_errors`)."""
     node, pre = s.nodes[i], s.preintegrated
     if pre[i, GYRO_INFORMATION] == 0.0:
         return

@@ -26,11 +26,12 @@ from tracking.filters.joint.hypotheses.alignment_sensitivity import (
     innovation_sensitivity,
     lever_arm_sensitivity,
 )
-from tracking.filters.joint.updates.nlos_model import (
+from tracking.filters.joint.updates.range_errors import (
+    learn_white_noise,
+    learns_noise,
     reset_bias_on_transition,
     update_nlos_posterior,
 )
-from tracking.filters.joint.updates.range_noise import learn_white_noise, learns_noise
 from tracking.kernels.jit import kernel, small_kernel
 from tracking.models.lever_arm import lever_arm_slope, rotate_lever_arm
 from tracking.models.range import range_model

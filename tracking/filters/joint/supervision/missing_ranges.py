@@ -1,22 +1,30 @@
-"""Stale nodes: nodes without ranges for a while, whose distances have become uncertain.
+"""Missing ranges: nodes that are silent, and radios that repeat one number.
 
-A second without measurements leaves a moving node a metre from its estimate, two seconds several.
-With a position error as large as the distance the linearisation of ranges fails: the filter
-converges to a reflected or rotated layout with a small covariance. So such a node joins again with
-its next range, and a group of such nodes starts again.
+**Silent.** A second without measurements leaves a moving node a metre from its estimate, two
+seconds several. With a position error as large as the distance the linearisation of ranges fails:
+the filter converges to a reflected or rotated layout with a small covariance. So a silent node
+whose distances have become uncertain, which is called stale, joins again with its next range, and a
+group of such nodes starts again. The criterion is the variance of its distances, which no rotation
+of the group changes.
 
-The criterion is the variance of its distances, which no rotation of the group changes.
+**Frozen.** Radios round to a millimetre or a centimetre, and some report every range twice, so a
+few equal ranges are no fault; recordings that are rounded to a centimetre have runs of up to 11.
+Nodes at rest may repeat one indefinitely. But noise of several centimetres does not repeat while
+they move.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tracking.filters.joint.hypotheses.bank import remove_node
+from tracking.filters.joint.hypotheses.static_initialisation import is_at_rest
 from tracking.kernels.jit import allocating_kernel, kernel, small_kernel
 
 SAME = 1e-5
-"""[s] Ranges of one message differ in time by rounding only."""
+"""[s] Ranges of one message differ in time by rounding only: they share a prediction."""
 
 
 @small_kernel
@@ -78,3 +86,36 @@ def is_stale(c, s, i):
         if along <= c.stale_share * c.stale_var * squared:
             return False
     return True
+
+
+@small_kernel
+def is_frozen(c, s, p, t, distance):
+    """True if a range repeats the earlier ranges of pair p too often; counts it in any case.
+
+    Such ranges are ignored until the number changes, also if the nodes have left by then.
+    """
+    pair = s.pairs[p]
+    if distance != pair.last_range:
+        pair.last_range, pair.t_last = distance, t
+        pair.n_equal, pair.distance_travelled = 0, 0.0
+        return False
+    pair.n_equal += 1
+    pair.distance_travelled += (t - pair.t_last) * (
+        certain_speed(c, s, s.nodes[pair.i], t) + certain_speed(c, s, s.nodes[pair.j], t)
+    )
+    pair.t_last = t
+    return pair.n_equal > c.frozen_ranges and pair.distance_travelled > c.frozen_distance
+
+
+@small_kernel
+def certain_speed(c, s, node, t):
+    """Return the speed of a node in the best hypothesis [m/s]; 0 if it may be at rest."""
+    if node.static or not node.present:
+        return 0.0
+    if is_at_rest(c, node, t):
+        return 0.0
+    h, squared = s.group[0].best, 0.0
+    for k in range(c.d):
+        squared += s.x[h, node.i_vel + k] ** 2
+    speed = math.sqrt(squared)
+    return speed if speed > c.frozen_speed else 0.0
