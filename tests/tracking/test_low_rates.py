@@ -9,6 +9,7 @@ from tests.exact_motion import ExactGroup
 from tracking import Constellation, NodeConfig, Status, Tracker
 from tracking.findings import find_in_estimates, find_unused
 from tracking.log import Log
+from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
 from tracking.metrics.integrity import wrong_while_ok
 
@@ -73,6 +74,17 @@ def test_without_any_imu_the_notes_say_what_cannot_be_known():
     assert find_unused(replace(log, block=group.block)) == []
 
 
+def test_a_truth_on_another_clock_is_a_finding():
+    group = ExactGroup("robot", range(3), hz=20.0, seconds=4.0)
+    t, no = np.arange(0.0, 4.0, 0.5), np.zeros(8)
+    truth = Truth(t, no.astype(int), np.zeros((8, 3)), np.zeros((8, 4)), no > 1, no < 1)
+    log = Log(name="late", constellation=group.constellation, block=group.block, truth=truth)
+    assert find_unused(log) == []
+    (found,) = find_unused(replace(log, truth=replace(truth, t=t + 1e9)))
+    assert found.name == "truth-clock"
+    assert "no time in common" in found.text
+
+
 @pytest.mark.parametrize("across", [0.0, 1.5])
 def test_a_row_of_nodes_at_rest_is_its_own_mirror_image(across):
     """Four people in a row, or one of them off the row."""
@@ -89,3 +101,15 @@ def test_a_row_of_nodes_at_rest_is_its_own_mirror_image(across):
     estimate = Tracker(who).run(block, np.arange(1.0, 14.9, 0.1)).take(0)
     found = [f.name for f in find_in_estimates(log, estimate, 0)]
     assert found == (["degenerate-layout"] if across == 0.0 else [])
+
+
+def test_a_layout_that_motion_does_not_tell_from_its_mirror_image_is_a_finding():
+    group = ExactGroup("robot", range(3), hz=20.0, seconds=8.0)
+    log = Log(name="undecided", constellation=group.constellation, block=group.block)
+    estimate = Tracker(group.constellation).run(group.block, np.arange(0.5, 7.9, 0.1)).take(0)
+    assert find_in_estimates(log, estimate, 0) == []
+    estimate.status[estimate.status == Status.OK] = Status.AMBIGUOUS
+    (found,) = find_in_estimates(log, estimate, 0)
+    assert (found.name, found.nodes) == ("undecided-layout", group.constellation.ids)
+    without_imu = group.block.take(group.block.kind[0] == Kind.RANGE)
+    assert find_in_estimates(replace(log, block=without_imu), estimate, 0) == []

@@ -111,6 +111,11 @@ KINDS: dict[str, Kind] = {
         "meta.toml has keys that are not read, such as misspelt ones",
         "correct or remove them: `docs/reference/log-format.md`",
     ),
+    "truth-clock": Kind(
+        "warning",
+        "the truth has no time in common with the measurements, so nothing is scored",
+        "stamp both on one clock",
+    ),
     "ranges-refused": Kind(
         "warning",
         "the filter refused many ranges as outliers: they are worse than it assumes",
@@ -120,6 +125,12 @@ KINDS: dict[str, Kind] = {
         "note",
         "a layout near a line (in space: a plane) is its own mirror image, so its side stays open",
         "place a node off the line, or drive until the group leaves it",
+    ),
+    "undecided-layout": Kind(
+        "note",
+        "the measured motion did not tell a layout from its mirror image or its rotations",
+        "let more nodes with an IMU move, longer and in curves; calibrate ranges and IMU; "
+        "`rmse_mirror` judges the shape meanwhile",
     ),
     "never-placed": Kind("note", "a node was never placed", "range it with more of the others"),
 }

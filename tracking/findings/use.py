@@ -24,6 +24,7 @@ def find_unused(log: Log) -> list[Finding]:
     block, constellation, found = log.block, log.constellation, list[Finding]()
     kind, node = block.kind[0], block.i[0]
     with_imu = np.unique(node[kind == Kind.IMU])
+    found += find_truth_outside(log)
     if log.unused_keys:
         text = f"meta.toml: {', '.join(log.unused_keys)} not read, expected a key of the log format"
         found.append(Finding("unused-keys", (), text))
@@ -51,6 +52,19 @@ def find_unused(log: Log) -> list[Finding]:
     return found
 
 
+def find_truth_outside(log: Log) -> list[Finding]:
+    """Find a truth of moving nodes that has no time in common with the measurements."""
+    truth, t = log.truth, log.block.t[0]
+    times = truth.t[truth.valid & ~log.constellation.is_static[truth.node]]
+    if not len(times) or not len(t) or (times.min() <= t.max() and times.max() >= t.min()):
+        return []
+    text = (
+        f"truth is from {times.min():.1f} to {times.max():.1f} s, measurements are from "
+        f"{t.min():.1f} to {t.max():.1f} s: no time in common, so nothing is scored"
+    )
+    return [Finding("truth-clock", (), text)]
+
+
 def find_in_estimates(log: Log, estimate: TeamEstimate, n_refused: int) -> list[Finding]:
     """Find what estimates of a recording lack, and why.
 
@@ -59,7 +73,7 @@ def find_in_estimates(log: Log, estimate: TeamEstimate, n_refused: int) -> list[
         estimate: Its estimates, arrays over (time, pair).
         n_refused: Ranges that the filter refused as outliers.
     """
-    found = [*find_unplaced(log, estimate), *find_degenerate(log, estimate)]
+    found = [*find_unplaced(log, estimate), *find_ambiguous(log, estimate)]
     return [*found, *find_refused(log, n_refused)]
 
 
@@ -98,8 +112,8 @@ def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
     return found
 
 
-def find_degenerate(log: Log, estimate: TeamEstimate) -> list[Finding]:
-    """Find a layout that stays ambiguous because it is near a line, or in space near a plane.
+def find_ambiguous(log: Log, estimate: TeamEstimate) -> list[Finding]:
+    """Find why a layout stays ambiguous: it is near a line or plane, or motion tells too little.
 
     Args:
         log: The recording.
@@ -120,15 +134,29 @@ def find_degenerate(log: Log, estimate: TeamEstimate) -> list[Finding]:
     extent = np.linalg.svd(pos - pos.mean(axis=1, keepdims=True), compute_uv=False)
     extent /= np.sqrt(constellation.n_nodes)
     least, most = np.median(extent[:, -1]), np.median(extent[:, 0])
+    share = len(rows) / len(placed)
     if least > FLAT * most:
-        return []
+        return _undecided(log, share)
     shape = "a line" if d == 2 else "a plane"
     text = (
-        f"for {len(rows) / len(placed):.0%} of the time the nodes stay near {shape} ({least:.2f} m "
+        f"for {share:.0%} of the time the nodes stay near {shape} ({least:.2f} m "
         f"across, {most:.2f} m along, standard deviations): it is its own mirror image, so pairs "
         "are ambiguous until the group leaves it"
     )
     return [Finding("degenerate-layout", (), text)]
+
+
+def _undecided(log: Log, share: float) -> list[Finding]:
+    """Report that motion did not tell a layout from its rotations and its mirror image."""
+    inertial = np.isin(log.block.kind[0], (Kind.IMU, Kind.STATE)) & log.block.valid[0]
+    if not inertial.any():
+        return []  # `no-imu` says it
+    ids = tuple(log.constellation.ids[n] for n in np.unique(log.block.i[0, inertial]))
+    text = (
+        f"for {share:.0%} of the time pairs are ambiguous: the motion of {names(ids)} did not "
+        "tell the layout from its mirror image or from other rotations"
+    )
+    return [Finding("undecided-layout", (), text)]
 
 
 def find_refused(log: Log, n_refused: int) -> list[Finding]:
