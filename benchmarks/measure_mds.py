@@ -89,7 +89,7 @@ if __name__ == "__main__":
     warnings.simplefilter("error")
     logs = {name: recording(name) for name in LOGS}
     for name, (folder, preset) in CONVERTED.items():
-        logs[name] = convert(data() / "raw" / folder, preset=preset)
+        logs[name] = convert(data() / "raw" / folder, preset=preset).log
     lines = [line(name, log) for name, log in logs.items()]
     FILE.write_text("".join(json.dumps(each) + "\n" for each in lines))
     print(FILE.read_text(), end="")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from agents.errors import UsageError
 from tracking.arrays import F64
 from tracking.errors import ConfigError
 from tracking.log import Log, check_target, write_log
+from tracking.measurements import Kind
 
 KINDS: dict[str, Callable[[Path, Mapping], Source]] = {
     "bag": lambda path, mapping: Bag(path, mapping.time),
@@ -33,6 +34,37 @@ KINDS: dict[str, Callable[[Path, Mapping], Source]] = {
 ITEMS = ("imu", "mag", "state", "ranges", "truth")
 
 
+@dataclass(frozen=True, slots=True)
+class StreamUse:
+    """What became of one entry of a mapping."""
+
+    table: str
+    """`imu`, `mag`, `state`, `ranges` or `truth`."""
+    streams: tuple[str, ...]
+    """Streams of the recording that match the entry."""
+    rows: int
+    left_out: int
+    """Measurements of nodes that the mapping omits, invalid ones, or with missing numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Conversion:
+    """A converted recording."""
+
+    log: Log
+    used: tuple[StreamUse, ...]
+    unused: tuple[str, ...]
+    """Streams of the recording that the mapping does not name."""
+
+    @property
+    def unsurveyed(self) -> tuple[int, ...]:
+        """Ids of static nodes, if there are several without known distances between them."""
+        group = self.log.constellation
+        static = tuple(node.id for node in group.nodes if node.kind == "static")
+        known = (self.log.block.kind[0] == Kind.SURVEY).any()
+        return static if len(static) > 1 and not known else ()
+
+
 def convert(
     source: Path | str,
     out: Path | str | None = None,
@@ -42,7 +74,7 @@ def convert(
     restamp: bool = False,
     overwrite: bool = False,
     progress: Callable[[float], None] | None = None,
-) -> Log:
+) -> Conversion:
     """Read a recording and write it as a log folder.
 
     Args:
@@ -67,16 +99,20 @@ def convert(
     with closing(KINDS[plan.mapping.kind](path, plan.mapping)) as opened:
         if plan.mapping.kind == "capture":
             plan = _with_streams(plan, opened.names())
-        tables = _read(plan, opened, progress or (lambda _: None))
+        tables, used = _read(plan, opened, progress or (lambda _: None))
+        taken = {stream for use in used for stream in use.streams}
+        unused = tuple(name for name in opened.names() if name not in taken)
     if "ranges" not in tables:
-        raise UsageError("ranges: expected some between nodes of the mapping, found none")
+        left_out = sum(use.left_out for use in used if use.table == "ranges")
+        text = f"found none and {left_out} that are invalid or of other nodes"
+        raise UsageError(f"ranges: expected some between nodes of the mapping, {text}")
     try:
         log = build_log(plan, tables, restamp)
     except ConfigError as error:
         raise UsageError(str(error)) from error
     if out is not None:
         write_log(out, log, overwrite=overwrite)
-    return log
+    return Conversion(log, tuple(used), unused)
 
 
 def _with_streams(plan: Plan, names: list[str]) -> Plan:
@@ -86,17 +122,25 @@ def _with_streams(plan: Plan, names: list[str]) -> Plan:
     return replace(plan, mapping=replace(plan.mapping, **found))
 
 
-def _read(plan: Plan, source: Source, progress: Callable[[float], None]) -> dict[str, F64]:
-    """Return the rows of each table that is not empty."""
+def _read(
+    plan: Plan, source: Source, progress: Callable[[float], None]
+) -> tuple[dict[str, F64], list[StreamUse]]:
+    """Return the rows of each table that is not empty, and what became of each entry."""
     items = [(name, item) for name in ITEMS for item in getattr(plan.mapping, name)]
     parts: dict[str, list[F64]] = {}
+    used = []
     for k, (name, item) in enumerate(items):
         found = [(stream, pattern(item.stream).match(stream)) for stream in source.names()]
         matched = {stream: match.groupdict() for stream, match in found if match}
         if not matched:
-            raise UsageError(f"stream {item.stream!r}: not in the recording")
+            has = ", ".join(source.names())
+            raise UsageError(
+                f"[[{name}]] stream: expected one of the recording, which has {has}; "
+                f"got {item.stream!r}"
+            )
         rows = read_rows(plan, item, source.records(list(matched)), matched)
-        if len(rows):
-            parts.setdefault(name, []).append(rows)
+        used.append(StreamUse(name, tuple(matched), len(rows.values), rows.left_out))
+        if len(rows.values):
+            parts.setdefault(name, []).append(rows.values)
         progress((k + 1) / len(items))
-    return {name: np.concatenate(rows) for name, rows in parts.items()}
+    return {name: np.concatenate(rows) for name, rows in parts.items()}, used

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -17,9 +17,18 @@ Item = Imu | Mag | Ranges | State | Truth
 Y_UP_TO_Z_UP = Rotation.from_rotvec([np.pi / 2.0, 0.0, 0.0])
 
 
+class Rows(NamedTuple):
+    """Rows of one entry of a mapping."""
+
+    values: F64
+    """(row, column), see `read_rows`."""
+    left_out: int
+    """Measurements left out: of other nodes, invalid, or with missing numbers."""
+
+
 def read_rows(
     plan: Plan, item: Item, records: Iterable[Record], parts: dict[str, dict[str, str]]
-) -> F64:
+) -> Rows:
     """Read the records of one entry of a mapping.
 
     Args:
@@ -40,11 +49,15 @@ def read_rows(
         UsageError: A field is missing or has a wrong number of elements.
     """
     rows: list[list[float]] = []
+    left_out = 0
     for record in records:
         t = record.k / item.rate if item.rate else record.t
         try:
             for row in _rows(plan, item, record.get, parts[record.stream]):
-                rows.append([t, *row])
+                if row is None:
+                    left_out += 1
+                else:
+                    rows.append([t, *row])
         except KeyError as error:
             raise UsageError(f"stream {record.stream!r}: no field {error.args[0]!r}") from error
         except (UsageError, TypeError, ValueError) as error:
@@ -52,24 +65,26 @@ def read_rows(
             raise UsageError(f"{where}: {error}") from error
     found = np.array(rows, dtype=np.float64)
     if not len(found):
-        return found
+        return Rows(found, left_out)
     if isinstance(item, (State, Truth)):
         found = _oriented(item, found, plan.mapping.up == "y")
     needed = found[:, :4] if isinstance(item, Ranges) else found
     if isinstance(item, Truth):
         needed = found[:, :5]
-    return np.asarray(found[np.isfinite(needed).all(axis=1)])
+    whole = np.isfinite(needed).all(axis=1)
+    return Rows(np.asarray(found[whole]), left_out + int((~whole).sum()))
 
 
-def _rows(plan: Plan, item: Item, get: Get, parts: dict[str, str]) -> Iterator[list[float]]:
+def _rows(plan: Plan, item: Item, get: Get, parts: dict[str, str]) -> Iterator[list[float] | None]:
+    """Yield the measurements of a record; None for one that is left out."""
     if isinstance(item, Ranges):
         for one in _each(item.each, get):
             yield from _ranges(plan, item, one, parts)
         return
     node = _node(plan, item.node, get, parts)
     if node is None:
-        return
-    if isinstance(item, Imu):
+        yield None
+    elif isinstance(item, Imu):
         gyr, acc = _numbers(get, item, "gyr", 3), _numbers(get, item, "acc", 3)
         yield [node, *(item.gyr_scale * v for v in gyr), *(item.acc_scale * v for v in acc)]
     elif isinstance(item, Mag):
@@ -92,13 +107,16 @@ def _each(name: str, get: Get) -> Iterable[Get]:
     return [inner(one) for one in get(name)]
 
 
-def _ranges(plan: Plan, item: Ranges, get: Get, parts: dict[str, str]) -> Iterator[list[float]]:
+def _ranges(
+    plan: Plan, item: Ranges, get: Get, parts: dict[str, str]
+) -> Iterator[list[float] | None]:
     if item.pairs:
         for (i, j), metres in zip(item.pairs, _every_number(get), strict=False):
             ends = _node(plan, i, get, parts), _node(plan, j, get, parts)
-            yield from _range(plan, item, get, ends, metres)
+            yield _range(plan, item, get, ends, metres)
         return
     if item.valid and not float(get(item.valid)):
+        yield None
         return
     metres = (
         float(np.mean(_numbers(get, item, "mean_of", len(item.mean_of))))
@@ -106,7 +124,7 @@ def _ranges(plan: Plan, item: Ranges, get: Get, parts: dict[str, str]) -> Iterat
         else _number(get(item.range))
     )
     ends = _node(plan, item.i, get, parts), _node(plan, item.j, get, parts)
-    yield from _range(plan, item, get, ends, metres)
+    yield _range(plan, item, get, ends, metres)
 
 
 def _every_number(get: Get) -> list[float]:
@@ -121,18 +139,18 @@ def _every_number(get: Get) -> list[float]:
 
 def _range(
     plan: Plan, item: Ranges, get: Get, nodes: tuple[int | None, int | None], metres: float
-) -> Iterator[list[float]]:
+) -> list[float] | None:
     i, j = nodes
     metres *= item.scale
     if i is None or j is None or i == j or not metres > 0.0:
-        return
+        return None
     antennas = []
     for node, ref in ((i, item.antenna_i), (j, item.antenna_j)):
         named = int(float(get(ref))) if ref else -1
         own = [a.id for a in plan.meta.constellation.antennas if a.node == node]
         antennas.append(named if named in own else -1)
     powers = [_number(get(p)) if p else np.nan for p in (item.rx_power, item.fp_power)]
-    yield [i, j, metres, *powers, *antennas]
+    return [i, j, metres, *powers, *antennas]
 
 
 def _node(plan: Plan, ref: str, get: Get, parts: dict[str, str]) -> int | None:

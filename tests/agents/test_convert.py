@@ -101,9 +101,9 @@ def folder(tmp_path):
 
 def test_axes_of_a_sensor_are_turned_to_those_of_the_body(folder):
     path = folder / "map.toml"
-    as_it_is = convert(folder / "tables", mapping=path)
+    as_it_is = convert(folder / "tables", mapping=path).log
     path.write_text(path.read_text().replace("[nodes.1]", '[nodes.1]\nimu_axes = ["-y", "x", "z"]'))
-    log = convert(folder / "tables", folder / "log", mapping=path)
+    log = convert(folder / "tables", folder / "log", mapping=path).log
     for got in (log, read_log(folder / "log")):
         own = (got.block.kind[0] == Kind.IMU) & (got.block.i[0] == 0)
         before = as_it_is.block.values[0, own]
@@ -112,7 +112,7 @@ def test_axes_of_a_sensor_are_turned_to_those_of_the_body(folder):
 
 
 def test_tables_become_a_log(folder):
-    log = convert(folder / "tables", folder / "log", mapping=folder / "map.toml")
+    log = convert(folder / "tables", folder / "log", mapping=folder / "map.toml").log
     back = read_log(folder / "log")
     for name in ("t", "kind", "i", "j", "values"):
         np.testing.assert_array_equal(getattr(back.block, name), getattr(log.block, name))
@@ -127,6 +127,27 @@ def test_tables_become_a_log(folder):
     assert log.truth.pos_w[of_car].tolist() == [[1.0, 2.0, 0.0]]
 
 
+def test_what_was_left_out_and_what_was_not_read_is_counted(folder):
+    (folder / "tables" / "camera.csv").write_text("t\n")
+    done = convert(folder / "tables", mapping=folder / "map.toml")
+    found = {use.table: (use.streams, use.rows, use.left_out) for use in done.used}
+    assert found == {
+        "imu": (("imu_1", "imu_2"), 400, 0),
+        "mag": (("imu_1", "imu_2"), 400, 0),
+        # An outlier below zero, one that is not valid, and one of another node.
+        "ranges": (("uwb",), 2, 3),
+        "truth": (("poses",), 1, 0),
+    }
+    assert done.unused == ("camera",)
+    assert done.unsurveyed == ()
+    path = folder / "map.toml"
+    path.write_text(path.read_text().replace("102 = [3.0, 4.0, 0.0]\n", ""))
+    assert convert(folder / "tables", mapping=path).unsurveyed == ()  # 102 has no measurement
+    with (folder / "tables" / "uwb.csv").open("a") as file:
+        file.write("1.7e9,1,102,1600,1\n")
+    assert convert(folder / "tables", mapping=path).unsurveyed == (101, 102)
+
+
 def test_restamping_takes_repeats_and_jitter_away(folder):
     path = folder / "tables" / "imu_1.csv"
     head, *rows = list(csv.reader(path.read_text().splitlines()))
@@ -135,7 +156,7 @@ def test_restamping_takes_repeats_and_jitter_away(folder):
         late = 0.01 if k % 2 else 0.0
         row[0] = f"{1.7e9 + 0.01 * k + late + 0.002 * rng.random():.6f}"
     path.write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
-    log = convert(folder / "tables", mapping=folder / "map.toml", restamp=True)
+    log = convert(folder / "tables", mapping=folder / "map.toml", restamp=True).log
     t = log.block.t[0, (log.block.kind[0] == Kind.IMU) & (log.block.i[0] == 0)]
     np.testing.assert_allclose(np.diff(t), 0.01, atol=2e-4)
 
@@ -160,7 +181,7 @@ def test_a_bag_becomes_a_log(folder):
         '[[ranges]]\nstream = "/uwb/{i}/to_{j}"\nrange = "range"\n'
     )
     (folder / "bag.toml").write_text(mapping)
-    log = convert(bag, mapping=folder / "bag.toml")
+    log = convert(bag, mapping=folder / "bag.toml").log
     ranges = log.block.take(log.block.kind[0] == Kind.RANGE)
     assert ranges.t[0].tolist() == [0.0, 0.0, 1.0, 1.0, 2.0, 2.0]
     assert sorted(zip(ranges.i[0].tolist(), ranges.j[0].tolist(), strict=True))[::3] == [
@@ -185,6 +206,14 @@ def _variance(kind):
         (
             lambda s: s.replace('range = "mm"', 'range = "mm"\nmean_of = ["mm"]'),
             "one of range, mean",
+        ),
+        (
+            lambda s: s.replace("imu_{node}", "{car}/imu"),
+            "stream: expected one of the recording, which has imu_1, imu_2, poses, uwb; got",
+        ),
+        (
+            lambda s: s.replace('i = "from"', 'i = "102"').replace('j = "to"', 'j = "102"'),
+            "ranges: expected some between nodes of the mapping, found none and 5 that are",
         ),
         (
             lambda s: s.replace('["gx", "gy", "gz"]', '["gx", "gy"]'),
@@ -234,7 +263,7 @@ def test_a_minus_turns_an_axis_and_nodes_without_measurements_are_left_out(folde
     path = folder / "map.toml"
     text = path.read_text().replace('["gx", "gy", "gz"]', '["gy", "-gx", "gz"]')
     path.write_text(text.replace("[ids]", '[nodes.9]\nvehicle = "car"\n[ids]'))
-    log = convert(folder / "tables", mapping=path)
+    log = convert(folder / "tables", mapping=path).log
     imu = log.block.values[0][log.block.kind[0] == Kind.IMU]
     np.testing.assert_allclose(imu[0, :3], [0.2, -0.1, 1.0])
     assert log.constellation.ids == (1, 2, 101, 102)
@@ -256,7 +285,7 @@ def test_a_pickle_of_arrays_of_a_body_becomes_a_log(tmp_path):
     turns, arrays = body_arrays(6, np.random.default_rng(1))
     with (tmp_path / "processed_0.pkl").open("wb") as file:
         pickle.dump(arrays, file)
-    log = convert(tmp_path / "processed_0.pkl", tmp_path / "log", preset="uip")
+    log = convert(tmp_path / "processed_0.pkl", tmp_path / "log", preset="uip").log
     back = read_log(tmp_path / "log")
     states = log.block.take(log.block.kind[0] == Kind.STATE)
     assert back.block.count(Kind.STATE) == states.n_events == 180
@@ -288,7 +317,7 @@ def test_two_bodies_are_twelve_nodes_and_sixty_six_pairs(tmp_path):
         for k in range(12)
     ]
     (tmp_path / "two.toml").write_text("\n".join(parts))
-    log = convert(tmp_path / "two.npz", mapping=tmp_path / "two.toml")
+    log = convert(tmp_path / "two.npz", mapping=tmp_path / "two.toml").log
     assert log.constellation.n_nodes == 12
     assert log.n_ranges == 660
     assert log.block.count(Kind.STATE) == 360
@@ -344,7 +373,7 @@ def test_a_capture_is_dated_by_the_clock_of_its_device(tmp_path):
     (tmp_path / "node.bin").write_bytes(b"\x12" + b"".join(frames))
     path = tmp_path / "map.toml"
     path.write_text(CAPTURE.format(form="linktrack", ids="0 = 1\n2 = 3\n1 = 2"))
-    log = convert(tmp_path / "node.bin", mapping=path)
+    log = convert(tmp_path / "node.bin", mapping=path).log
     ranges = log.block.take(log.block.kind[0] == Kind.RANGE)
     np.testing.assert_allclose(np.unique(ranges.t[0]), [0.0, 0.02, 0.04, 0.06], atol=1e-9)
     assert sorted(ranges.values[0, :, 0].tolist()) == [2.85] * 4 + [6.0, 7.0, 8.0, 9.0]
@@ -363,7 +392,7 @@ def test_a_capture_of_lines_names_nodes_by_their_hexadecimal_ids(tmp_path):
     ]
     (tmp_path / "a.txt").write_text("\n".join(lines) + "\n")
     (tmp_path / "map.toml").write_text(CAPTURE.format(form="uwb-core", ids="989C = 1\n1234 = 2"))
-    log = convert(tmp_path / "a.txt", mapping=tmp_path / "map.toml")
+    log = convert(tmp_path / "a.txt", mapping=tmp_path / "map.toml").log
     assert log.n_ranges == 2
     np.testing.assert_allclose(log.block.t[0], [0.0, 0.131168], atol=1e-9)
     (tmp_path / "a.txt").write_text("nothing\n")
@@ -395,7 +424,7 @@ def test_the_command_says_what_it_made(folder):
 def test_presets_read_what_was_recorded(data, preset, source, log):
     """The reference is an independent conversion: the same samples and ranges, rounded."""
     assert preset in PRESETS
-    ours, theirs = convert(data / "raw" / source, preset=preset), read_log(data / "logs" / log)
+    ours, theirs = convert(data / "raw" / source, preset=preset).log, read_log(data / "logs" / log)
     for kind, digits in ((Kind.IMU, 5e-6), (Kind.RANGE, 6e-3)):
         a, b = (each.block.take(each.block.kind[0] == kind) for each in (ours, theirs))
         assert a.n_events == b.n_events
@@ -408,7 +437,7 @@ def test_presets_read_what_was_recorded(data, preset, source, log):
 def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
     from agents.evaluation.track import track_log
 
-    found = track_log(convert(data / "raw" / "tiers_ros2", preset="tiers"))
+    found = track_log(convert(data / "raw" / "tiers_ros2", preset="tiers").log)
     assert found.score.rmse_mirror is not None
     assert found.score.rmse_mirror < 0.6
     assert "no-imu" in {f.name for f in found.findings}
@@ -419,7 +448,7 @@ def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
 )
 def test_their_ranges_are_found_to_be_long_in_an_excerpt(data):
     """They are 0.36 m too long in the whole recording (tests/real_data)."""
-    log = convert(data / "raw" / "tiers_ros2", preset="tiers")
+    log = convert(data / "raw" / "tiers_ros2", preset="tiers").log
     assert "range-offset" in {f.name for f in examine(log)[1]}
 
 
@@ -438,7 +467,7 @@ def residuals(log):
 )
 def test_presets_agree_with_the_truth_of_the_recording(data, preset, source, n_ranges, median):
     """The authors' ranges are too long by centimetres (murp) and by metres (plaza2)."""
-    log = convert(data / "raw" / source, preset=preset)
+    log = convert(data / "raw" / source, preset=preset).log
     assert log.n_ranges == n_ranges
     assert len(residuals(log)) == n_ranges
     assert 0.0 < np.median(residuals(log)) < median
@@ -450,7 +479,7 @@ def test_a_drone_with_two_radios_has_two_antennas(data, tmp_path):
     folder.mkdir()
     for path in (data / "raw" / "miluv").glob("*.gz"):
         shutil.copy(path, folder / path.name.replace("_first_rows", ""))
-    log = convert(tmp_path, preset="miluv")
+    log = convert(tmp_path, preset="miluv").log
     assert log.constellation.ids == (1, 100, 101, 102, 103, 104, 105)
     assert (log.n_ranges, log.block.count(Kind.IMU)) == (954, 1999)
     assert sorted(set(log.block.antenna_i[0][log.block.kind[0] == Kind.RANGE].tolist())) == [0, 1]

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import click
 
-from agents.cli.console import emit_json, progress_bar
+from agents.cli.console import emit_json, print_table, progress_bar
 from agents.cli.options import json_option, log_out_options
 
 FOLDER = Path(__file__).parents[2] / "convert" / "presets"
+MOST_NAMES = 8
+"""[-] Streams that are named in a line."""
 PRESETS = ", ".join(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
@@ -39,7 +43,7 @@ def convert(
     from agents.convert import convert as run
 
     with progress_bar(f"reading {source}") as report:
-        log = run(
+        done = run(
             source,
             out,
             preset=preset,
@@ -48,6 +52,7 @@ def convert(
             overwrite=overwrite,
             progress=report,
         )
+    log = done.log
     record = {
         "log": log.name,
         "out": str(out),
@@ -55,11 +60,30 @@ def convert(
         "duration_s": log.duration,
         "ranges": log.n_ranges,
         "truth_rows": len(log.truth.t),
+        "streams": [asdict(use) for use in done.used],
+        "unused_streams": list(done.unused),
     }
     if as_json:
         emit_json([record])
-    else:
+        return
+    rows = [(u.table, _few(u.streams), f"{u.rows:,}", f"{u.left_out:,}") for u in done.used]
+    print_table("Streams", ["table", "of", "rows", "left out"], rows)
+    if any(use.left_out for use in done.used):
         click.echo(
-            f"{out}: {record['nodes']} nodes, {log.duration:.0f} s, {log.n_ranges} ranges, "
-            f"{len(log.truth.t)} rows of truth"
+            "Left out: measurements of nodes outside the mapping, invalid or missing numbers."
         )
+    if done.unused:
+        click.echo(f"Not in the mapping: {_few(done.unused)}.")
+    if done.unsurveyed:
+        ids = ", ".join(map(str, done.unsurveyed))
+        click.echo(
+            f"The distances between the static nodes {ids} are not given: [places] in the mapping "
+            "makes them known."
+        )
+    click.echo(f"{out}: {record['nodes']} nodes, {log.duration:.0f} s, {log.n_ranges} ranges")
+
+
+def _few(names: Sequence[str]) -> str:
+    """Return the first few names as a text."""
+    rest = len(names) - MOST_NAMES
+    return ", ".join(names[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")
