@@ -20,7 +20,7 @@ from tracking.arrays import F64
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.estimate import TeamEstimate
-from tracking.filters import DEFAULT_FILTER, FilterBuilder, filter_builder
+from tracking.filters import DEFAULT_FILTER, FilterBuilder, build_filter
 from tracking.filters.joint import JointEkf
 from tracking.filters.params import FilterParams
 from tracking.kernels.jit import Call
@@ -53,12 +53,14 @@ class Tracker:
         filter: str | FilterBuilder = DEFAULT_FILTER,
         n_envs: int = 1,
     ) -> None:
+        if n_envs < 1:
+            raise ConfigError(f"n_envs: expected 1 or more, got {n_envs}")
         params = params or TrackerParams()
         self.constellation = constellation
         self.n_envs = n_envs
         self._t = np.full(n_envs, -np.inf)
         """Time of the last event handled by `run`, (env) [s]."""
-        self._filter = filter_builder(filter)(constellation, params.filter, n_envs)
+        self._filter = build_filter(filter, constellation, params.filter, n_envs)
         self._orientation = Orientation(
             constellation, params.orientation, n_envs, follows_bias=self._filter.follows_bias
         )

@@ -21,7 +21,7 @@ from tracking.ahrs.orientation import Orientation
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
-from tracking.filters import FilterBuilder, filter_builder
+from tracking.filters import FilterBuilder, build_filter
 from tracking.kernels.jit import bind
 from tracking.late_data.horizon import Horizon
 from tracking.measurements import MeasurementBlock
@@ -83,7 +83,7 @@ class OwnPerception:
         n_envs, n_cars = powered.shape
         rows = n_envs * n_cars
         self.constellation = constellation
-        self._filter = filter_builder(filter)(constellation, params.filter, rows)
+        self._filter = build_filter(filter, constellation, params.filter, rows)
         self._orientation = Orientation(
             constellation, params.orientation, n_envs, follows_bias=self._filter.follows_bias
         )

@@ -17,6 +17,7 @@ from relpos_env.formation_v0 import parallel_env
 from relpos_env.interface.actions import ContinuousActions
 from relpos_env.interface.observations.ranges import Ranges
 from relpos_env.tasks.rendezvous import Rendezvous
+from tracking.constellation import Constellation, NodeConfig
 from tracking.errors import ConfigError
 from tracking.filters import FILTERS, filter_builder
 from tracking.tracker import Tracker
@@ -109,7 +110,19 @@ def test_controllers_and_filters_by_name():
     assert filter_builder(f"{HERE}:slow_filter") is slow_filter or callable(
         filter_builder(f"{HERE}:slow_filter")
     )
-    assert Tracker
+
+
+def test_what_is_no_filter_is_refused_before_it_runs():
+    who = Constellation(nodes=tuple(NodeConfig(id=k) for k in range(3)), dimensions=2)
+    expected = (
+        r"filter: expected a function \(constellation, params, n_envs\) that returns a Filter"
+    )
+    with pytest.raises(ConfigError, match=f"{expected}, got 'os:system'"):
+        Tracker(who, filter="os:system")
+    with pytest.raises(ConfigError, match=f"{expected}, got .*, which returns tuple"):
+        Tracker(who, filter=lambda *given: given)
+    with pytest.raises(ConfigError, match="n_envs: expected 1 or more, got 0"):
+        Tracker(who, n_envs=0)
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from inspect import signature
 
 from tracking.constellation import Constellation
+from tracking.errors import ConfigError
 from tracking.filters.base import Filter
 from tracking.filters.joint import JointEkf
 from tracking.filters.pair import PairEkf
@@ -53,4 +55,35 @@ def filter_builder(
     return look_up(FILTERS, name, "filter", group="relpos_env.filters")
 
 
-__all__ = ["DEFAULT_FILTER", "FILTERS", "Filter", "FilterBuilder", "FilterParams", "filter_builder"]
+def build_filter(
+    name: str | FilterBuilder, constellation: Constellation, params: FilterParams, n_envs: int
+) -> Filter:
+    """Return a filter over a batch of groups.
+
+    Args:
+        name: As for `filter_builder`.
+        constellation: The nodes.
+        params: Parameters of all filters.
+        n_envs: Number of groups.
+
+    Raises:
+        ConfigError: No filter has that name, or it is something else than a filter.
+    """
+    builder = filter_builder(name)
+    expected = "filter: expected a function (constellation, params, n_envs) that returns a Filter"
+    try:
+        signature(builder).bind(constellation, params, n_envs)
+    except TypeError:
+        raise ConfigError(f"{expected}, got {name!r}") from None
+    except ValueError:
+        pass  # some functions of C have no signature
+    built = builder(constellation, params, n_envs)
+    if not isinstance(built, Filter):
+        raise ConfigError(f"{expected}, got {name!r}, which returns {type(built).__name__}")
+    return built
+
+
+__all__ = [
+    "DEFAULT_FILTER", "FILTERS", "Filter", "FilterBuilder", "FilterParams", "build_filter",
+    "filter_builder",
+]  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from tracking.arrays import F64
 from tracking.estimate import TeamEstimate
@@ -11,6 +11,7 @@ from tracking.kernels.jit import Call
 from tracking.measurements import MeasurementBlock
 
 
+@runtime_checkable
 class Filter(Protocol):
     """A position filter over a batch of groups.
 
