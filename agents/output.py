@@ -64,7 +64,9 @@ def check_new(folder: Path, hint: str = "") -> None:
         UsageError: The folder exists and is not empty.
     """
     try:
-        taken = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+        if folder.exists() and not folder.is_dir():
+            raise UsageError(f"--out {folder}: is a file, expected a new or empty folder")
+        taken = folder.exists() and any(folder.iterdir())
     except OSError as error:
         raise UsageError(f"--out {folder}: cannot be written to ({error.strerror})") from error
     if taken:

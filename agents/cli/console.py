@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import click
 
+LINE_EVERY = 10.0
+"""[s] Time between two lines about progress where there is no terminal."""
 WIDEST = 10_000
 """[-] Largest width of a line in characters."""
 
@@ -21,8 +24,19 @@ def emit_json(records: Iterable[Mapping[str, Any]]) -> None:
 
 
 @contextmanager
-def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar on stderr, if that is a terminal; yield a function for the share done."""
+def progress_bar(
+    label: str, *, shown: bool = True, at_once: bool = True
+) -> Iterator[Callable[[float], None]]:
+    """Show progress on stderr: a bar on a terminal, otherwise a line every `LINE_EVERY` seconds.
+
+    Args:
+        label: Text before the bar.
+        shown: Whether anything is shown.
+        at_once: Whether the bar is there before the first report, which another bar may precede.
+
+    Yields:
+        A function of the share done.
+    """
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -34,17 +48,42 @@ def progress_bar(label: str, *, shown: bool = True) -> Iterator[Callable[[float]
     )
 
     console = Console(stderr=True)
-    columns = (
+    if not shown or not console.is_terminal:
+        yield _in_lines(label) if shown else lambda share: None
+        return
+    bar = Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
+        console=console,
     )
-    with Progress(*columns, console=console, disable=not shown or not console.is_terminal) as bar:
-        task = bar.add_task(label, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+    task = bar.add_task(label, total=1.0)
+
+    def report(share: float) -> None:
+        bar.start()
+        bar.update(task, completed=share)
+
+    if at_once:
+        bar.start()
+    try:
+        yield report
+    finally:
+        bar.stop()
+
+
+def _in_lines(label: str) -> Callable[[float], None]:
+    last = time.monotonic()
+
+    def report(share: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= LINE_EVERY:
+            last = time.monotonic()
+            click.echo(f"{label}: {share:.0%}", err=True)
+
+    return report
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -43,7 +43,8 @@ def compare(
     jobs: int = 1,
     engine: str = "local",
     address: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    ready: Callable[[], None] = lambda: None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> CompareResult:
     """Evaluate every driver on every observation mode in every scenario, on the same seeds.
 
@@ -71,6 +72,7 @@ def compare(
         jobs: Parallel processes; the results do not depend on it.
         engine: One of `agents.jobs.ENGINES`.
         address: Address of a running cluster, see `agents.jobs.find_engine`.
+        ready: Called when the arguments have been checked, before the first episode.
         progress: Called with the completed share, 0 to 1.
 
     Raises:
@@ -107,11 +109,12 @@ def compare(
         for k in range(0, episodes, BATCH)
         for row in empty
     ]
+    ready()
+    progress(0.0)
     done: dict[int, list[EpisodeResult]] = {}
     for n, found in work(run_episodes, tasks, jobs):
         done[n] = found
-        if progress is not None:
-            progress(len(done) / len(tasks))
+        progress(len(done) / len(tasks))
     rows = [
         Row(
             contender=row.contender,

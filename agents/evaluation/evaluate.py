@@ -129,7 +129,8 @@ def evaluate(
     jobs: int = 1,
     engine: str = "local",
     address: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    ready: Callable[[], None] = lambda: None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> EvaluateResult:
     """Track simulated runs of every case and seed with every filter, and score them.
 
@@ -144,6 +145,7 @@ def evaluate(
         jobs: Parallel processes. Only the measured time per round depends on it.
         engine: One of `agents.jobs.ENGINES`.
         address: Address of a running cluster, see `agents.jobs.find_engine`.
+        ready: Called when the arguments have been checked, before the first run.
         progress: Called with the completed share, 0 to 1.
 
     Raises:
@@ -161,12 +163,13 @@ def evaluate(
     check_jobs(jobs)
     work = find_engine(engine, address)
     tasks = [(case, seed, names, seconds) for seed in range(seeds) for case in chosen.cases]
+    ready()
+    progress(0.0)
     done: dict[tuple[str, int], list[RunResult]] = {}
     for n, runs in work(run_seed, tasks, jobs):
         case, seed, _, _ = tasks[n]
         done[case.name, seed] = runs
-        if progress is not None:
-            progress(len(done) / len(tasks))
+        progress(len(done) / len(tasks))
     cases = tuple(
         CaseResult(
             suite=chosen.name,
@@ -210,7 +213,7 @@ def check_filters(names: Iterable[str]) -> tuple[str, ...]:
         for name in chosen:
             filter_builder(name)
     except ConfigError as error:
-        raise UsageError(f"--filter: {error}") from error
+        raise UsageError(f"--{error}") from error
     return chosen
 
 

@@ -135,10 +135,14 @@ def _simulated(
     from tracking.filters import DEFAULT_FILTER
 
     scenarios = options.pop("scenarios") or (None,)
-    warm_up_first([DEFAULT_FILTER], purpose="env", in_space=False)
-    with progress_bar("compare") as tell:
+    with progress_bar("compare", at_once=False) as tell:
         result = run(
-            drivers=names, observations=observations, scenarios=scenarios, progress=tell, **options
+            drivers=names,
+            observations=observations,
+            scenarios=scenarios,
+            ready=lambda: warm_up_first([DEFAULT_FILTER], purpose="env", in_space=False),
+            progress=tell,
+            **options,
         )
     if not filmed:
         return result, []

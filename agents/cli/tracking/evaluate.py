@@ -57,8 +57,7 @@ def evaluate(
 
     if out is not None:
         check_folder(out, ["report.html"])
-    warm_up_first(filters)
-    with progress_bar(f"evaluate {suite}") as tell:
+    with progress_bar(f"evaluate {suite}", at_once=False) as tell:
         result = run(
             suite=suite,
             filters=filters,
@@ -67,6 +66,7 @@ def evaluate(
             jobs=jobs,
             engine=engine,
             address=address,
+            ready=lambda: warm_up_first(filters),
             progress=tell,
         )
     if out is not None:

@@ -206,7 +206,7 @@ def print_tracks(results: Sequence[Any]) -> None:
         head = [f"{s['log']}  {s['filter']}", "all"]
         rows.append([*head, *(metres(s[k]) for k in ERRORS)])
         if r.expected:
-            rows.append(["", "efficient", *(metres(r.expected.get(k)) for k in ERRORS)])
+            rows.append(["", "bound", *(metres(r.expected.get(k)) for k in ERRORS)])
         pairs = [p for p, e in enumerate(r.score.pair_rmse) if e == e]
         for p in pairs:
             figures = (r.score.pair_rmse, r.score.pair_rmse_yaw, r.score.pair_rmse_shape)
@@ -224,12 +224,15 @@ def print_tracks(results: Sequence[Any]) -> None:
             f"{r.realtime_factor:.0f} times faster than real time"
         )
         if r.score.rmse is None:
-            reason = (
-                "there is no truth"
-                if not len(r.log.truth.t)
-                else (f"no estimated pair has truth from {r.skip:g} s after the first range")
-            )
-            click.echo(f"{r.log.name}, {r.filter}: no errors, since {reason}")
+            click.echo(f"{r.log.name}, {r.filter}: not scored: {_why_not_scored(r)}")
+
+
+def _why_not_scored(r: Any) -> str:
+    if not len(r.log.truth.t):
+        return "the log has no truth"
+    if r.skip >= r.log.duration:
+        return f"--skip leaves out the first {r.skip:g} s, the log has {r.log.duration:.1f} s"
+    return f"no estimated pair has truth from {r.skip:g} s after the first range"
 
 
 def _examined(log: Log) -> tuple[Log, list[Finding]]:
