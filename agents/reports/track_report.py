@@ -33,7 +33,7 @@ def track_report(results: Sequence[TrackResult]) -> str:
         "after the best rotation and reflection (rmse_mirror). ok: share of the scored time; "
         f"wrong: share of the run in which a pair was ok and off by more than {LIMIT:g} m and "
         f"{SIGMAS:g} of its own standard deviations. NEES and NIS are 1 where the covariance is "
-        "right. efficient: expected errors of an efficient estimator, if the assumed noise is true."
+        "right. bound: expected errors of an efficient estimator, if the assumed noise is true."
     )
     header = [
         "log", "filter", "rmse", "rmse_yaw", "yaw deg", "rmse_shape", "rmse_mirror", "ok",
@@ -50,7 +50,7 @@ def track_report(results: Sequence[TrackResult]) -> str:
         rows.append([s["log"], s["filter"], *figures, yaw, *others])
         if r.expected:
             world, turned, shape, _ = (metres(r.expected.get(name)) for name in ERRORS)
-            rows.append(["", "efficient", world, turned, "", shape, *[""] * 5])
+            rows.append(["", "bound", world, turned, "", shape, *[""] * 5])
     page.table(header, rows)
     for r in results:
         _add_result(page, r)
