@@ -81,10 +81,14 @@ def _add_result(page: Page, r: TrackResult) -> None:
     if not pairs:
         page.text("No pair has a moving node, so there is nothing to draw.")
         return
-    page.figure(_trajectories(r, pairs), "Relative trajectories from above, seen from node i.")
+    page.figure(
+        _trajectories(r, pairs),
+        "Relative trajectories from above, seen from node i, after one constant yaw.",
+    )
     page.figure(
         _errors(r, pairs),
-        "Position error of each axis after one constant yaw, with the filter's own 3-sigma band.",
+        "Position error of each axis after one constant yaw, with the filter's own 3-sigma band; "
+        "shaded where the pair is not ok.",
     )
     page.figure(_ranges(r, pairs), "Measured ranges, estimated and true distance.")
 
@@ -101,6 +105,20 @@ def _known(r: TrackResult, p: int) -> np.ndarray:
     return known
 
 
+def _is_ok(r: TrackResult, p: int) -> np.ndarray:
+    is_ok: np.ndarray = r.estimate.status[:, p] == Status.OK
+    return is_ok
+
+
+def _finish(figure: Figure, axes: np.ndarray, n: int) -> Figure:
+    """Put the legend above the axes, where it hides nothing, and remove empty axes."""
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    for ax in axes[n:]:
+        ax.remove()
+    return figure
+
+
 def _axes(n: int, height: float) -> tuple[Figure, np.ndarray]:
 
     columns = min(n, 3)
@@ -115,18 +133,18 @@ def _trajectories(r: TrackResult, pairs: list[int]) -> Figure:
     yaw = np.radians(r.score.yaw_deg or 0.0)
     c, s = np.cos(yaw), np.sin(yaw)
     for ax, p in zip(axes, pairs, strict=False):
-        ok = _known(r, p)
-        x, y = r.estimate.pos_ij_w[ok, p, 0], r.estimate.pos_ij_w[ok, p, 1]
-        seen = r.has_truth[:, p]
-        ax.plot(*r.truth_ij_w[seen, p, :2].T, color="0.6", lw=2.2, label="truth")
-        ax.plot(c * x - s * y, s * x + c * y, color="C0", lw=0.9, label="estimate, one yaw")
+        x, y = r.estimate.pos_ij_w[:, p, 0], r.estimate.pos_ij_w[:, p, 1]
+        xy = np.stack([c * x - s * y, s * x + c * y])
+        known, is_ok = _known(r, p), _is_ok(r, p)
+        true = np.where(r.has_truth[:, p], r.truth_ij_w[:, p, :2].T, np.nan)
+        ax.plot(*true, color="0.6", lw=2.2, label="truth")
+        unsure = np.where(known & ~is_ok, xy, np.nan)
+        ax.plot(*unsure, ".", color="C1", ms=1.5, label="estimate, not ok")
+        ax.plot(*np.where(is_ok, xy, np.nan), color="C0", lw=0.9, label="estimate, ok")
         ax.plot(0, 0, "k+", ms=9)
         ax.set(title=pair_name(r.log.constellation, p), xlabel="x [m]", ylabel="y [m]")
         ax.set_aspect("equal", "datalim")
-    axes[0].legend(loc="best")
-    for ax in axes[len(pairs) :]:
-        ax.remove()
-    return figure
+    return _finish(figure, axes, len(pairs))
 
 
 @in_style
@@ -140,13 +158,14 @@ def _errors(r: TrackResult, pairs: list[int]) -> Figure:
             ax.plot(t, np.where(ok, error[:, p, axis], np.nan), f"C{axis}", lw=0.8, label=name)
         band = np.where(ok, 3.0 * r.estimate.pos_std[:, p].max(axis=1), np.nan)
         ax.fill_between(t, -band, band, color="0.85", zorder=0, label="3 sigma")
+        unsure = _known(r, p) & ~_is_ok(r, p)
+        over = ax.get_xaxis_transform()
+        ax.fill_between(t, 0, 1, where=unsure, transform=over, color="C1", alpha=0.12, lw=0,
+                        zorder=-1, label="not ok")  # fmt: skip
         ax.set(title=pair_name(r.log.constellation, p), xlabel="t [s]", ylabel="error [m]")
         limit = np.nanpercentile(np.abs(error[ok, p]), 99) * 1.3 if ok.any() else 1.0
         ax.set_ylim(-max(limit, 0.2), max(limit, 0.2))
-    axes[0].legend()
-    for ax in axes[len(pairs) :]:
-        ax.remove()
-    return figure
+    return _finish(figure, axes, len(pairs))
 
 
 @in_style
@@ -176,7 +195,4 @@ def _ranges(r: TrackResult, pairs: list[int]) -> Figure:
         if mine.any():
             top = np.percentile(block.values[0, mine, 0], 99.5) * 1.15
             ax.set_ylim(0, max(float(top), 0.5))
-    axes[0].legend()
-    for ax in axes[len(pairs) :]:
-        ax.remove()
-    return figure
+    return _finish(figure, axes, len(pairs))

@@ -86,7 +86,7 @@ def test_smoothed_estimates_are_better(recording):
     ratios = []
     for seed in range(4):
         log = simulate(scenario="cars-nlos", seconds=20.0, seed=seed)
-        plain, smooth = (track_log(log, smooth=each).score for each in (None, "lag"))
+        plain, smooth = (track_log(log, smooth=each, findings=[]).score for each in (None, "lag"))
         ratios.append(smooth.rmse_shape / plain.rmse_shape)
     assert sum(ratios) / len(ratios) < 0.99
     done = relpos("track", recording, "--filter", "ekf", "--smooth", "lag")

@@ -437,7 +437,7 @@ def test_presets_read_what_was_recorded(data, preset, source, log):
 def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
     from agents.evaluation.track import track_log
 
-    found = track_log(convert(data / "raw" / "tiers_ros2", preset="tiers").log)
+    found = track_log(convert(data / "raw" / "tiers_ros2", preset="tiers").log, findings=[])
     assert found.score.rmse_mirror is not None
     assert found.score.rmse_mirror < 0.6
     assert "no-imu" in {f.name for f in found.findings}

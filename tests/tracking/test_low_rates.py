@@ -7,7 +7,9 @@ import pytest
 
 from tests.exact_motion import ExactGroup
 from tracking import Constellation, NodeConfig, Status, Tracker
+from tracking.estimate import TeamEstimate
 from tracking.findings import find_in_estimates, find_unused
+from tracking.findings.ambiguity import find_ambiguous
 from tracking.log import Log
 from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
@@ -113,3 +115,23 @@ def test_a_layout_that_motion_does_not_tell_from_its_mirror_image_is_a_finding()
     assert (found.name, found.nodes) == ("undecided-layout", group.constellation.ids)
     without_imu = group.block.take(group.block.kind[0] == Kind.RANGE)
     assert find_in_estimates(replace(log, block=without_imu), estimate, 0) == []
+
+
+@pytest.mark.parametrize("up", [0.02, 0.8])
+def test_a_node_that_moves_in_a_plane_among_static_ones_is_a_finding(up):
+    nodes = (NodeConfig(id=9), *(NodeConfig(id=k, kind="static", vehicle="none") for k in range(4)))
+    who = Constellation(nodes=nodes, dimensions=3, heading="initial")
+    t = np.arange(0.0, 20.0, 0.05)
+    where = np.array([[0, 0, 0], [4, 0, 1], [0, 4, 2], [4, 4, -1.0]])
+    path = np.stack([np.cos(t), np.sin(t), up * np.sin(3.0 * t)], axis=1) + 2.0
+    path[200:] *= [1.0, 1.0, -1.0]  # the other image
+    pos = np.concatenate([path[:, None], np.broadcast_to(where, (len(t), 4, 3))], axis=1)
+    estimate = TeamEstimate.empty(who, t[None]).take(0)
+    i, j = who.pairs.T
+    estimate.pos_ij_w[...] = pos[:, j] - pos[:, i]
+    estimate.status[...] = Status.AMBIGUOUS
+    block = MeasurementBlock.of_kind(Kind.IMU, t, 0 * t.astype(int), np.zeros((len(t), 6)))
+    log = Log(name="loop", constellation=who, block=block)
+    (found,) = find_ambiguous(log, estimate)
+    assert found.name == ("degenerate-motion" if up < 0.1 else "undecided-layout")
+    assert found.nodes == (9,)

@@ -126,6 +126,11 @@ KINDS: dict[str, Kind] = {
         "a layout near a line (in space: a plane) is its own mirror image, so its side stays open",
         "place a node off the line, or drive until the group leaves it",
     ),
+    "degenerate-motion": Kind(
+        "note",
+        "a node that moves along a line (in space: in a plane) fits two mirror images of the rest",
+        "move it off that line or plane too: up and down for seconds, if it is a plane",
+    ),
     "undecided-layout": Kind(
         "note",
         "the measured motion did not tell a layout from its mirror image or its rotations",

@@ -7,14 +7,11 @@ import numpy as np
 from tracking.arrays import Bool
 from tracking.estimate import Status, TeamEstimate
 from tracking.filters.joint.params import JointStartParams
+from tracking.findings.ambiguity import find_ambiguous
 from tracking.findings.finding import Finding, names
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
-MOST_AMBIGUOUS = 0.5
-"""[-] Share of the time that may be ambiguous without a reason being looked for."""
-FLAT = 0.1
-"""[-] Extent across a layout over that along it, below which it is called a line or a plane."""
 MOST_REFUSED = 0.2
 """[-] Largest share of rejected ranges; tracked recordings have up to 0.02, a lost one 0.5."""
 
@@ -110,53 +107,6 @@ def find_unplaced(log: Log, estimate: TeamEstimate) -> list[Finding]:
         )
         found.append(Finding("never-placed", (constellation.ids[n],), text))
     return found
-
-
-def find_ambiguous(log: Log, estimate: TeamEstimate) -> list[Finding]:
-    """Find why a layout stays ambiguous: it is near a line or plane, or motion tells too little.
-
-    Args:
-        log: The recording.
-        estimate: Its estimates, arrays over (time, pair).
-    """
-    constellation = log.constellation
-    d, pairs = constellation.dimensions, constellation.pairs
-    placed = estimate.status >= Status.AMBIGUOUS
-    if constellation.n_nodes <= d:
-        return []
-    rows = np.flatnonzero(placed.all(axis=1) & (estimate.status == Status.AMBIGUOUS).any(axis=1))
-    if len(rows) <= MOST_AMBIGUOUS * len(placed):
-        return []
-    to_first = np.flatnonzero(pairs[:, 0] == 0)
-    pos = np.concatenate(
-        [np.zeros((len(rows), 1, 3)), estimate.pos_ij_w[rows][:, to_first]], axis=1
-    )[..., :d]
-    extent = np.linalg.svd(pos - pos.mean(axis=1, keepdims=True), compute_uv=False)
-    extent /= np.sqrt(constellation.n_nodes)
-    least, most = np.median(extent[:, -1]), np.median(extent[:, 0])
-    share = len(rows) / len(placed)
-    if least > FLAT * most:
-        return _undecided(log, share)
-    shape = "a line" if d == 2 else "a plane"
-    text = (
-        f"for {share:.0%} of the time the nodes stay near {shape} ({least:.2f} m "
-        f"across, {most:.2f} m along, standard deviations): it is its own mirror image, so pairs "
-        "are ambiguous until the group leaves it"
-    )
-    return [Finding("degenerate-layout", (), text)]
-
-
-def _undecided(log: Log, share: float) -> list[Finding]:
-    """Report that motion did not tell a layout from its rotations and its mirror image."""
-    inertial = np.isin(log.block.kind[0], (Kind.IMU, Kind.STATE)) & log.block.valid[0]
-    if not inertial.any():
-        return []  # `no-imu` says it
-    ids = tuple(log.constellation.ids[n] for n in np.unique(log.block.i[0, inertial]))
-    text = (
-        f"for {share:.0%} of the time pairs are ambiguous: the motion of {names(ids)} did not "
-        "tell the layout from its mirror image or from other rotations"
-    )
-    return [Finding("undecided-layout", (), text)]
 
 
 def find_refused(log: Log, n_refused: int) -> list[Finding]:

@@ -126,9 +126,9 @@ def make_layout(constellation: Constellation, params: JointParams) -> Layout:
 def room_to_wait(n_states: int) -> int:
     """Return how many updates may be pending: 0 if the covariance fits the nearest cache.
 
-    Otherwise enough for the ranges of six nodes and their motion constraints.
+    Otherwise the ranges of six nodes: room for more takes memory and saves no time.
     """
-    return 24 if n_states > 48 else 0
+    return 16 if n_states > 48 else 0
 
 
 def open_elements(dimensions: int) -> int:
