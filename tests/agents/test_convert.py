@@ -18,7 +18,7 @@ from agents.convert import PRESETS, convert
 from agents.convert.arrays import Arrays
 from agents.convert.sources import pattern
 from agents.errors import UsageError
-from tracking.findings import examine
+from tracking.findings import examine, find_unused
 from tracking.log import read_log
 from tracking.measurements import Kind
 
@@ -197,7 +197,10 @@ def _variance(kind):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda s: s.replace('stream = "uwb"', 'stream = "radio"'), "stream 'radio': not in the"),
+        (
+            lambda s: s.replace('stream = "uwb"', 'stream = "radio"'),
+            "expected one of the recording, which has .*; got 'radio'",
+        ),
         (lambda s: s.replace('range = "mm"', 'range = "cm"'), "stream 'uwb': no field 'cm'"),
         (lambda s: s.replace('time = "t"', 'time = "when"'), "no column 'when'"),
         (lambda s: s.replace("beacon = 101", "beacon = 103"), r"ids\.beacon: expected one of"),
@@ -437,7 +440,8 @@ def test_presets_read_what_was_recorded(data, preset, source, log):
 def test_robots_without_imu_are_followed_but_for_rotation_and_mirror(data):
     from agents.evaluation.track import track_log
 
-    found = track_log(convert(data / "raw" / "tiers_ros2", preset="tiers").log, findings=[])
+    log = convert(data / "raw" / "tiers_ros2", preset="tiers").log
+    found = track_log(log, findings=find_unused(log))
     assert found.score.rmse_mirror is not None
     assert found.score.rmse_mirror < 0.6
     assert "no-imu" in {f.name for f in found.findings}

@@ -13,7 +13,7 @@ from tracking.ahrs.params import OrientationParams, RestParams
 from tracking.constellation import Constellation, NodeConfig
 from tracking.geometry import GRAVITY, rotate, yaw_of
 from tracking.measurements import Kind, MeasurementBlock
-from tracking.sanity import imu, saturation
+from tracking.sanity import imu
 from tracking.sanity.params import SanityParams
 
 
@@ -50,11 +50,11 @@ def inspect(health, samples, dt=0.01):
 
 
 def new_limits():
-    return np.zeros((1, 1, saturation.N_LIMIT))
+    return np.zeros((1, 1, imu.N_LIMIT))
 
 
 def at_limit(limits, accel_b):
-    found = np.array([saturation.find_limits(SANITY, limits, 0, 0, *row) for row in accel_b])
+    found = np.array([imu.find_limits(SANITY, limits, 0, 0, *row) for row in accel_b])
     return found[:, :3], found[:, 3]
 
 
