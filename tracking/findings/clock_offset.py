@@ -27,9 +27,8 @@ NEAR = np.array([-0.2, -0.1, 0.0, 0.1, 0.2])
 """[s] Trial offsets of all nodes together, and of each node."""
 ALL = np.concatenate([-np.arange(0.4, 4.1, 0.4)[::-1], NEAR, np.arange(0.4, 4.1, 0.4)])
 """[s] Trial offsets if ranges are likeliest at the ends of `NEAR`, or an IMU is suspected."""
-LEAST_GAIN, LEAST_ALONE = 0.01, 0.02
-"""[-] Least gain in log-likelihood of a range: for all nodes together, and for a single node,
-since its mount on its vehicle looks a little like a clock offset."""
+LEAST_GAIN = 0.01
+"""[-] Least gain in log-likelihood of a range; a right clock seems to gain up to 0.007."""
 NEGLIGIBLE = 0.04
 """[s] Largest offset that counts as none."""
 CARRIED = 0.5
@@ -68,9 +67,8 @@ def correct_clocks(
         for nodes in through(groups, len(found), progress):
             found_here = _offset(log, nodes, suspects)
             is_alone = len(nodes) == 1 and nodes[0] not in suspects and len(carriers) > 1
-            if found_here is not None and is_alone:
-                is_sure = found_here.gain >= LEAST_ALONE and not _drifts(found_here)
-                found_here = found_here if is_sure else None
+            if found_here is not None and is_alone and _drifts(found_here):
+                found_here = None
             tried.append(found_here)
         gains = [0.0 if one is None else one.gain for one in tried]
         nodes, offset = groups[int(np.argmax(gains))], tried[int(np.argmax(gains))]
