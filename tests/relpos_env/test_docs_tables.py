@@ -62,7 +62,7 @@ def test_tables_are_complete():
     (2, 2, "2"), (1, 2, "n - 1"), (2, 4, "2 (n - 1)"), (14, 22, "8 (n - 1) + 6"),
 ])  # fmt: skip
 def test_sizes_in_cars(at_two, at_three, size):
-    assert MAKE["in_others"](at_two, at_three) == size
+    assert MAKE["environment"].in_others(at_two, at_three) == size
     for n, value in ((2, at_two), (3, at_three)):
         assert eval(size.replace(" (", " * ("), {"n": n}) == value
 

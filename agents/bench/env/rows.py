@@ -8,6 +8,7 @@ from typing import Any
 from agents.bench.env.batch import SCENARIO, Batch
 from agents.bench.env.drives import Chance, Drive, followed
 from agents.bench.env.effort import EPISODE, FULL, Effort
+from agents.bench.env.form_torchrl import TorchBatch, has_torchrl
 from agents.bench.env.growth import Point, growth
 from agents.bench.env.parts import parts_of
 from agents.bench.env.peer_mpe2 import Spread, mpe2_name
@@ -50,6 +51,7 @@ def bench_env(
         lambda: _batch(effort, SCENARIO, "by chance"),
         lambda: _batch(effort, NLOS, "followed"),
         lambda: [_kept(effort)],
+        lambda: _torchrl(effort, tell),
         lambda: _threads(effort),
         lambda: [_processes(effort, rows)],
         lambda: [_curve_row(point) for point in growth(effort, progress=curve)],
@@ -105,6 +107,23 @@ def _kept(effort: Effort) -> Row:
     ours.close()
     what = f"{SCENARIO}, followed, physics pymunk"
     return _row(what, cost, envs=effort.envs, peer=pymunk_name(), peer_cost=peer_cost)
+
+
+def _torchrl(effort: Effort, tell: Callable[[str], None] | None) -> list[Row]:
+    """Measure the TorchRL form of a batch against the batch."""
+    if not has_torchrl():
+        if tell is not None:
+            tell("bench: torchrl is not installed, its figure is left out")
+        return []
+    bare = Batch(effort.envs, followed, resets=effort.resets)
+    ours = TorchBatch(effort.envs, followed, resets=effort.resets)
+    for batch in (bare, ours):
+        batch.warm_up(effort.warm_up)
+    cost, peer_cost = best_of_turns([ours.turn, bare.turn], effort.turns)
+    for batch in (bare, ours):
+        batch.close()
+    what = f"{SCENARIO}, followed, FormationTorchEnv"
+    return [_row(what, cost, envs=effort.envs, peer="FormationVectorEnv", peer_cost=peer_cost)]
 
 
 def _threads(effort: Effort) -> list[Row]:

@@ -1,0 +1,1 @@
+"""Tables of the documents, by topic; `make_tables.py` names them."""
