@@ -22,7 +22,7 @@ demo-hardware: $(VENV)/.hardware
 
 test: $(VENV)/.dev
 	$(BIN)/relpos warmup --for all
-	$(BIN)/python -m pytest -n auto -m 'not realtime'
+	$(BIN)/python -m pytest -n auto --dist loadscope -m 'not realtime'
 	$(BIN)/python -m pytest -m realtime
 
 check: $(VENV)/.dev

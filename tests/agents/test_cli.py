@@ -59,8 +59,8 @@ def test_track_prints_a_table(recording):
 def test_track_tells_the_least_error_that_is_possible(recording, tmp_path):
     done = relpos("track", recording, "--bound", "--skip", 5, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
-    assert "efficient" in done.stdout
-    assert "efficient" in (tmp_path / "out" / "report.html").read_text()
+    assert "bound" in done.stdout
+    assert "bound" in (tmp_path / "out" / "report.html").read_text()
     told = json.loads(relpos("track", recording, "--bound", "--json").stdout)
     assert 0.0 < told["bound_rmse_shape"] <= told["bound_rmse_yaw"] <= told["bound_rmse"]
     assert "bound_rmse" not in json.loads(relpos("track", recording, "--json").stdout)

@@ -144,9 +144,9 @@ def test_command_line_writes_a_report_and_rows(tmp_path):
         (["--suite", "moon"], "--suite: expected one of paper, robustness, scaling, got 'moon'"),
         (
             ["--filter", "joint", "--filter", "magic"],
-            "--filter: filter: expected one of joint, ekf-mds, ekf",
+            "--filter: expected one of joint, ekf-mds, ekf",
         ),
-        (["--filter", ""], "--filter: filter: expected one of"),
+        (["--filter", ""], "--filter: expected one of"),
         (["--seeds", "0"], "--seeds: expected 1 to 100000, got 0"),
         (["--jobs", "0"], "--jobs: expected 1 to 1024, got 0"),
         (["--seconds", "12"], "--seconds: expected 15 to 1800, got 12"),

@@ -40,4 +40,4 @@ def test_demo_looks_at_its_folder_before_it_drives(tmp_path, monkeypatch):
     monkeypatch.setattr("agents.simulation.demo.demo", lambda **_: pytest.fail("it drove"))
     (tmp_path / "file").write_text("")
     done = CliRunner().invoke(cli, ["demo", "--out", str(tmp_path / "file")])
-    assert "exists already, expected a new or empty folder" in str(done.exception)
+    assert "is a file, expected a new or empty folder" in str(done.exception)
