@@ -50,7 +50,7 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     """Bind a kernel to arguments that are refilled arrays.
 
     Finding the types of many arrays takes longer than most kernels. It is done once here, and
-    the compiled code is then called without a check.
+    the compiled code is then called without a check. Parts of a batch are bound repeatedly.
 
     Args:
         kernel: Kernel to call.
@@ -59,8 +59,12 @@ def bind(kernel: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     if config.DISABLE_JIT:
         return partial(kernel, *arguments)
     compiled: Any = kernel
-    entry = compiled.compile(types_of(arguments))
-    return partial(entry, *arguments)
+    kind = kind_of(arguments)
+    if kind is None:
+        return partial(compiled.compile(types_of(arguments)), *arguments)
+    if (kernel, kind) not in _entries:
+        _entries[kernel, kind] = compiled.compile(types_of(arguments))
+    return partial(_entries[kernel, kind], *arguments)
 
 
 def is_compiled(kernel: Callable[..., Any], *arguments: Any) -> bool:
@@ -83,12 +87,14 @@ def types_of(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 _types: dict[Any, Any] = {}
-"""Cache of numba's types: parts of a batch are bound repeatedly."""
+"""Cache of numba's types."""
+_entries: dict[Any, Callable[..., Any]] = {}
+"""Compiled code by kernel and kind of its arguments."""
 
 
 def type_of(value: Any) -> Any:
     """Return the numba type of an argument, faster than numba."""
-    kind = _kind_of(value)
+    kind = kind_of(value)
     if kind is None:
         return typeof(value)
     if kind not in _types:
@@ -96,14 +102,14 @@ def type_of(value: Any) -> Any:
     return _types[kind]
 
 
-def _kind_of(value: Any) -> tuple[Any, ...] | None:
+def kind_of(value: Any) -> tuple[Any, ...] | None:
     """Return the key of the type of an array, number or tuple of them; None for all else."""
     if type(value) is np.ndarray:
         flags, dtype = value.flags, value.dtype
         layout = flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned
         return dtype, dtype.isalignedstruct, value.ndim, *layout
     if isinstance(value, tuple):
-        kinds = [_kind_of(each) for each in value]
+        kinds = [kind_of(each) for each in value]
         return None if any(kind is None for kind in kinds) else (type(value), *kinds)
     if type(value) is int:
         bits = value.bit_length()

@@ -28,7 +28,7 @@ from tracking.filters.joint.supervision.actions import reinitialise_node
 from tracking.filters.joint.supervision.missing_ranges import drop_stale
 from tracking.filters.joint.updates.surveyed_distance import apply_surveys
 from tracking.kernels.addresses import by_reference
-from tracking.kernels.jit import Call, bind, kernel
+from tracking.kernels.jit import Call, bind, kernel, kind_of
 
 
 @kernel
@@ -146,6 +146,8 @@ def remove(coefficients, layout, state, work, t):
     remove_node(coefficients[0], s, layout, cursor[NODE])
 
 
+_compiled: set[Any] = set()
+"""Groups, in the plane or in space, and kinds of arguments whose kernels are all compiled."""
 Rare = Callable[..., None]
 ACTIONS: dict[int, tuple[Rare, ...]] = {
     workspace.TIME_OUT: (time_out,),
@@ -197,9 +199,15 @@ def run_to_end(run: Callable[[], int], arguments: tuple[Any, ...]) -> None:
 
 def compile_all(arguments: tuple[Any, ...]) -> None:
     """Compile all rare kernels in advance, for callers with deadlines."""
+    coefficients, _, state, *_ = arguments
+    known = actions_of(coefficients, state) is ACTIONS, kind_of(arguments)
+    if known in _compiled:
+        return
     for calls in rare_calls(arguments):
         for rare, given in calls:
             bind(rare, *given)
+    if known[1] is not None:
+        _compiled.add(known)
 
 
 def rare_calls(arguments: tuple[Any, ...]) -> list[list[Call]]:
