@@ -14,7 +14,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from tables import environment, hardware, measured, tracker
+from tables import env_speed, environment, hardware, measured, tracker
 from tables.api import api
 from tables.markdown import markdown
 
@@ -37,6 +37,9 @@ TABLES: dict[str, Callable[[], str]] = {
     "second-world": measured.second_world,
     "own-trackers": measured.own_trackers,
     "time-to-ok": measured.time_to_ok,
+    "env-speed": env_speed.speeds,
+    "env-parts": env_speed.parts,
+    **{f"env-growth-{name}": partial(env_speed.growth, name) for name in env_speed.CURVES},
     "tracker-cost": measured.tracker_cost,
     "policy-results": measured.policy_results,
     "room-results": measured.room_results,

@@ -84,7 +84,7 @@ def discrete() -> str:
             cells.append(str(number))
             number += 1
         rows.append([f"{speed:g} m/s", *cells])
-    return markdown(head, rows, right=", ".join(head[1:]))
+    return markdown(head, rows, right="rest")
 
 
 def weights() -> str:

@@ -10,9 +10,10 @@ from typing import Any
 
 
 def markdown(head: Iterable[str], rows: Iterable[Iterable[str]], right: str = "") -> str:
-    """Return a Markdown table; `right` names the right-aligned columns."""
+    """Return a Markdown table; `right` names right-aligned columns, "rest" is all but the first."""
     head = list(head)
-    rule = ["--:" if name in right.split(", ") else "---" for name in head]
+    named = head[1:] if right == "rest" else right.split(", ")
+    rule = ["--:" if name in named else "---" for name in head]
     lines = ["| " + " | ".join(cells) + " |" for cells in (head, *rows)]
     lines.insert(1, "|" + "|".join(rule) + "|")
     return "\n".join(lines) + "\n"

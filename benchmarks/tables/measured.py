@@ -27,7 +27,7 @@ def second_world() -> str:
             f"{100.0 * r['ok']:.0f} %", f"{100.0 * r['wrong']:.2f} %",
             f"{100.0 * r['within']:.1f} %",
         ])  # fmt: skip
-    return markdown(head, rows, right=", ".join(head[1:]))
+    return markdown(head, rows, right="rest")
 
 
 def time_to_ok() -> str:
@@ -41,7 +41,7 @@ def time_to_ok() -> str:
             f"{100.0 * r['within_twice']:.0f} %", f"{r['never']}/{r['sufficient']}",
             f"{r['matched_s']:.1f}", f"{100.0 * r['matched_within_twice']:.0f} %",
         ])  # fmt: skip
-    return markdown(head, rows, right=", ".join(head[1:]))
+    return markdown(head, rows, right="rest")
 
 
 def own_trackers() -> str:
@@ -134,7 +134,7 @@ def mds_results() -> str:
         errors = ["-" if line[k] is None else f"{line[k]:.2f}" for k in ("joint", "mds")]
         rows.append([line["case"], str(line["nodes"]), *errors, str(line["instants"])])
     head = ("recording", "nodes", "joint [m]", "MDS [m]", "instants with all pairs")
-    return markdown(head, rows, right=", ".join(head[1:]))
+    return markdown(head, rows, right="rest")
 
 
 def tracker_cost() -> str:
@@ -153,7 +153,7 @@ def tracker_cost() -> str:
             f"{loops[case] / of['joint']:.1f}", f"{of['filterpy']:.0f}", gtsam,
         ])  # fmt: skip
     head = ("a step of", "joint [us]", "plain loops over SIMD", "filterpy [us]", "GTSAM [us]")
-    return markdown(head, rows, right=", ".join(head[1:]))
+    return markdown(head, rows, right="rest")
 
 
 def measured(name: str) -> list[dict[str, Any]]:
