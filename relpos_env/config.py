@@ -57,8 +57,9 @@ class FormationConfig:
     """The task's own options, by name."""
     n_cars: int | None = None
     """Number of car slots, 2 to 20; by default the largest number of cars of the scenario."""
-    level: int | None = None
-    """Curriculum level of the randomisation, 0 to 4, in place of the scenario's own."""
+    level: int | str | None = None
+    """Level of the randomisation in place of the scenario's own: 0 to 4, or `easy` (1), `medium`,
+    `hard`, `expert` (4)."""
     observation: str | ModeBuilder = "estimate"
     """Observation mode: one of `relpos_env.interface.observations.OBSERVATIONS`, or your own."""
     history: int = 1
@@ -127,7 +128,7 @@ class FormationConfig:
             raise EnvError(f"scenario: expected a name, a path or a scenario, got {requested!r}")
         scenario = find_scenario(requested)
         if self.level is not None:
-            scenario = scenario.at_level(whole_number("level", self.level, 0, 4))
+            scenario = scenario.at_level(self.level)
         n_cars = self.n_cars
         if n_cars is None:
             n_cars = scenario.most_cars

@@ -29,17 +29,18 @@ def compare(
     drivers: Sequence[str],
     observations: Sequence[str] = ("estimate",),
     scenarios: Sequence[str | Path | None] = (None,),
-    task: str = "ring",
+    tasks: Sequence[str] = ("ring",),
     task_options: Mapping[str, Any] | None = None,
     cars: int | None = None,
     trackers: Trackers = "group",
-    level: int | None = None,
+    level: int | str | None = None,
     operator: float = 1.0,
     proximity: int | None = None,
     episodes: int = 100,
     first_seed: int = FIRST_SEED,
     seconds: float = 60.0,
     settle: float = SETTLE,
+    protocol: str | None = None,
     jobs: int = 1,
     engine: str = "local",
     address: str | None = None,
@@ -56,11 +57,11 @@ def compare(
             `agents.policies.load_policy`.
         observations: Modes of `relpos_env.interface.observations.OBSERVATIONS`.
         scenarios: Names of `relpos_env.scenarios.SCENARIOS` or TOML files; None for the task's own.
-        task: One of `relpos_env.tasks.TASKS`.
+        tasks: Names in `relpos_env.tasks.TASKS`.
         task_options: Options of the task, by name.
         cars: Slots for cars; by default the maximum of the scenario.
         trackers: `group` for one tracker of the group, `own` for one on each car.
-        level: Curriculum level of the randomisation, 0 to 4.
+        level: Level of the randomisation, 0 to 4, or easy, medium, hard, expert.
         operator: Share of episodes with an operator; in the others cars only follow the plan, as
             real cars without a remote control do [-].
         proximity: Distance sensors per car; by default those that each policy was trained with,
@@ -69,6 +70,8 @@ def compare(
         first_seed: Seed of the first episode.
         seconds: Length of an episode, shorter if the task is accomplished [s].
         settle: Time from which errors are scored [s].
+        protocol: Name of the protocol that the arguments are of, for reports
+            (`agents.comparison.protocol.protocol_arguments`).
         jobs: Parallel processes; the results do not depend on it.
         engine: One of `agents.jobs.ENGINES`.
         address: Address of a running cluster, see `agents.jobs.find_engine`.
@@ -97,6 +100,7 @@ def compare(
             seconds=seconds,
             settle=settle,
         )
+        for task in each_once("--task", tasks)
         for scenario in each_once("--scenario", scenarios)
     ]
     if proximity is not None and not 0 <= proximity <= MAX_RANGEFINDERS:
@@ -104,7 +108,7 @@ def compare(
     chosen = line_up(each_once("NAME", drivers), modes(observations), proximity)
     empty, notes = _who_can(chosen, settings)
     seeds = range(first_seed, first_seed + episodes)
-    tasks = [
+    batches = [
         (row.contender, row.setting, seeds[k : k + BATCH])
         for k in range(0, episodes, BATCH)
         for row in empty
@@ -112,22 +116,27 @@ def compare(
     ready()
     progress(0.0)
     done: dict[int, list[EpisodeResult]] = {}
-    for n, found in work(run_episodes, tasks, jobs):
+    for n, found in work(run_episodes, batches, jobs):
         done[n] = found
-        progress(len(done) / len(tasks))
+        progress(len(done) / len(batches))
     rows = [
         Row(
             contender=row.contender,
             trained_on=row.trained_on,
             setting=row.setting,
             scenario=row.scenario,
+            group=row.group,
             cars=row.cars,
-            episodes=tuple(e for n in range(k, len(tasks), len(empty)) for e in done[n]),
+            episodes=tuple(e for n in range(k, len(batches), len(empty)) for e in done[n]),
         )
         for k, row in enumerate(empty)
     ]
     return CompareResult(
-        rows=tuple(rows), notes=tuple(notes), first_seed=first_seed, seeds=episodes
+        rows=tuple(rows),
+        notes=tuple(notes),
+        first_seed=first_seed,
+        seeds=episodes,
+        protocol=protocol,
     )
 
 
@@ -136,21 +145,25 @@ def _who_can(
 ) -> tuple[list[Row], list[str]]:
     """Return rows without episodes of the compatible candidates, and notes on the others."""
     rows: list[Row] = []
+    n_tasks = len({setting.task for setting in settings})
     refused: dict[tuple[str, str], list[str]] = {}
     for setting in settings:
         for contender in contenders:
             entry = find_entry(contender.name)
             parts = setting.parts(contender.observation, entry.history, contender.proximity)
             why = entry.refusal(contender.observation, parts.n_cars, contender.proximity)
+            name = parts.scenario.name
+            group = name if n_tasks == 1 else f"{setting.task} in {name}"
             if why is not None:
-                refused.setdefault((contender.label, why), []).append(parts.scenario.name)
+                refused.setdefault((contender.label, why), []).append(group)
                 continue
             rows.append(
                 Row(
                     contender=contender,
                     trained_on=entry.trained_on,
                     setting=setting,
-                    scenario=parts.scenario.name,
+                    scenario=name,
+                    group=group,
                     cars=parts.n_cars,
                     episodes=(),
                 )
@@ -158,7 +171,10 @@ def _who_can(
     notes = [f"{who} in {', '.join(names)}: {why}" for (who, why), names in refused.items()]
     if not rows:
         raise UsageError("NAME: nothing to compare: " + "; ".join(notes))
-    found = {setting.parts(rows[0].contender.observation, 1).scenario.name for setting in settings}
+    found = {
+        (setting.task, setting.parts(rows[0].contender.observation, 1).scenario.name)
+        for setting in settings
+    }
     if len(found) < len(settings):
         raise UsageError("--scenario: expected scenarios of different names")
     return rows, notes

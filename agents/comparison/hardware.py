@@ -149,6 +149,7 @@ class _Candidate:
             trained_on=self.trained_on,
             setting=setting,
             scenario=config.name,
+            group=config.name,
             cars=config.n_slots,
             episodes=tuple(self.rounds[:rounds]),
         )

@@ -34,6 +34,9 @@ class Row:
     setting: Setting
     scenario: str
     """Name of the scenario."""
+    group: str
+    """Name of the rows that are compared with each other: the scenario, or with several tasks
+    the task and the scenario."""
     cars: int
     """[-] Slots for cars."""
     episodes: tuple[EpisodeResult, ...]
@@ -72,7 +75,7 @@ class CompareResult:
     __repr__ = short_repr
 
     rows: tuple[Row, ...]
-    """Rows by scenario, then driver, then observation mode."""
+    """Rows by task and scenario, then driver, then observation mode."""
     notes: tuple[str, ...]
     """Incompatible combinations with reasons."""
     first_seed: int
@@ -80,25 +83,27 @@ class CompareResult:
     seeds: int
     errors_from: Literal["truth", "estimates"] = "truth"
     """Source of the errors: ground truth, or the estimates of real cars."""
+    protocol: str | None = None
+    """Name of the evaluation protocol."""
     remarks: tuple[str, ...] = ()
     """Incidents with real cars during the comparison."""
 
     @property
-    def scenarios(self) -> tuple[str, ...]:
-        """Names of the scenarios, in order."""
-        return tuple(dict.fromkeys(r.scenario for r in self.rows))
+    def groups(self) -> tuple[str, ...]:
+        """Names of the groups of rows, in order."""
+        return tuple(dict.fromkeys(r.group for r in self.rows))
 
     @property
     def contenders(self) -> tuple[Contender, ...]:
         """All candidates, in order."""
         return tuple(dict.fromkeys(r.contender for r in self.rows))
 
-    def of(self, scenario: str) -> list[Row]:
-        """Return the rows of a scenario."""
-        return [r for r in self.rows if r.scenario == scenario]
+    def of(self, group: str) -> list[Row]:
+        """Return the rows of a group."""
+        return [r for r in self.rows if r.group == group]
 
-    def reference(self, scenario: str) -> Row:
-        """Return the reference of a scenario for ratios.
+    def reference(self, group: str) -> Row:
+        """Return the reference of a group for ratios.
 
         The reference is the controller with the lowest formation error on other modes than
         `truth`; without one, the best controller on `truth`; without controllers, the best policy.
@@ -109,7 +114,7 @@ class CompareResult:
             uses_truth = row.contender.observation == "truth"
             return row.trained_on is not None, uses_truth, np.inf if error is None else error.value
 
-        return min(self.of(scenario), key=rank)
+        return min(self.of(group), key=rank)
 
     @cached_property
     def records(self) -> list[dict[str, Any]]:
@@ -125,6 +130,7 @@ class CompareResult:
                 "observation": row.contender.observation,
                 "proximity": row.contender.proximity,
                 "scenario": row.scenario,
+                "task": row.setting.task,
                 "errors_from": self.errors_from,
                 "seed": e.seed,
                 **{name: _number(getattr(e, name)) for name in FIGURES},
@@ -137,7 +143,7 @@ class CompareResult:
 
     def _record(self, row: Row) -> dict[str, Any]:
         error, *others = (row.means[name] for name in FIGURES)
-        reference = self.reference(row.scenario)
+        reference = self.reference(row.group)
         compared = row.ratio(reference)
         return {
             "policy": row.contender.called,
@@ -146,6 +152,7 @@ class CompareResult:
             "proximity": row.contender.proximity,
             "scenario": row.scenario,
             "task": row.setting.task,
+            "protocol": self.protocol,
             "trackers": row.setting.trackers,
             "level": row.setting.level,
             "operator": row.setting.operator,

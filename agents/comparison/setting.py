@@ -28,8 +28,8 @@ class Setting:
     """[-] Slots for cars; by default the maximum of the scenario."""
     trackers: Trackers = "group"
     """One tracker of the group, or one on each car."""
-    level: int | None = None
-    """Curriculum level of the randomisation, 0 to 4, in place of the scenario's own."""
+    level: int | str | None = None
+    """Level of the randomisation, 0 to 4 or a name, in place of the scenario's own."""
     operator: float = 1.0
     """[-] Share of episodes with an operator; in the others cars only follow the plan."""
     seconds: float = 60.0

@@ -82,16 +82,16 @@ def _colours(result: CompareResult) -> dict[str, str]:
 
 def _bars(result: CompareResult) -> Figure:
 
-    colours, scenarios, measured = _colours(result), result.scenarios, _measured(result)
-    counts = [len(result.of(s)) for s in scenarios]
+    colours, groups, measured = _colours(result), result.groups, _measured(result)
+    counts = [len(result.of(s)) for s in groups]
     height = sum(0.34 * n + 0.9 for n in counts) + 0.2
     figure = new_figure(3.0 + 2.0 * len(measured), height)
     axes = figure.subplots(
-        len(scenarios), len(measured), squeeze=False, sharey="row",
+        len(groups), len(measured), squeeze=False, sharey="row",
         height_ratios=[n + 0.6 for n in counts],
     )  # fmt: skip
-    for line, scenario in zip(axes, scenarios, strict=True):
-        rows = result.of(scenario)
+    for line, group in zip(axes, groups, strict=True):
+        rows = result.of(group)
         for ax, name in zip(line, measured, strict=True):
             scale = _scale(name)
             for y, row in enumerate(rows):
@@ -103,7 +103,7 @@ def _bars(result: CompareResult) -> Figure:
             ax.tick_params(axis="y", length=0)
             ax.locator_params(axis="x", nbins=3)
         line[0].set_yticks(range(len(rows)), [r.contender.label for r in rows])
-        line[0].set_title(scenario, loc="left", fontweight="bold")
+        line[0].set_title(group, loc="left", fontweight="bold")
     for ax, name in zip(axes[-1], measured, strict=True):
         ax.set_xlabel(LABELS[name])
     figure.suptitle(f"means of {_episodes(result)}, 95 % intervals", fontsize=9)
@@ -140,8 +140,8 @@ def _scale(name: str) -> float:
 
 
 def _panels(result: CompareResult, width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure with one panel per scenario."""
-    names = result.scenarios
+    """Return a figure with one panel per group."""
+    names = result.groups
     columns = min(len(names), COLUMNS)
     lines = -(-len(names) // columns)
     width = max(width * columns, 7.0)
@@ -157,8 +157,8 @@ def _panels(result: CompareResult, width: float, height: float) -> tuple[Figure,
 def _over_time(result: CompareResult) -> Figure:
     colours = _colours(result)
     figure, axes = _panels(result, 4.0, 3.2)
-    for ax, scenario in zip(axes, result.scenarios, strict=True):
-        rows, top = result.of(scenario), 0.0
+    for ax, group in zip(axes, result.groups, strict=True):
+        rows, top = result.of(group), 0.0
         setting = rows[0].setting
         ax.axvspan(0, setting.settle, color="0.94", lw=0)
         for row in rows:
@@ -188,12 +188,12 @@ def _quartiles(row: Row) -> tuple[np.ndarray, np.ndarray]:
 def _scatter(result: CompareResult) -> Figure:
     colours = _colours(result)
     figure, axes = _panels(result, 4.0, 3.4)
-    for ax, scenario in zip(axes, result.scenarios, strict=True):
-        for row in result.of(scenario):
+    for ax, group in zip(axes, result.groups, strict=True):
+        for row in result.of(group):
             x, y = row.values("tracking_error"), row.values("formation_error")
             colour = colours[row.contender.label]
             ax.plot(x, y, ".", color=colour, ms=7, alpha=0.45, mew=0, label=row.contender.label)
-        for row in result.of(scenario):
+        for row in result.of(group):
             x_mean, y_mean = row.means["tracking_error"], row.means["formation_error"]
             if x_mean is not None and y_mean is not None:
                 colour = colours[row.contender.label]
@@ -208,13 +208,13 @@ def _scatter(result: CompareResult) -> Figure:
 
 
 def _ratios(result: CompareResult) -> Figure:
-    colours, scenarios = _colours(result), result.scenarios
-    counts = [len(result.of(s)) for s in scenarios]
+    colours, groups = _colours(result), result.groups
+    counts = [len(result.of(s)) for s in groups]
     figure = new_figure(9, sum(0.34 * n + 0.9 for n in counts) + 0.2)
     heights = [n + 0.6 for n in counts]
-    axes = figure.subplots(len(scenarios), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for ax, scenario in zip(axes, scenarios, strict=True):
-        rows, reference = result.of(scenario), result.reference(scenario)
+    axes = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
+    for ax, group in zip(axes, groups, strict=True):
+        rows, reference = result.of(group), result.reference(group)
         for y, row in enumerate(rows):
             found = row.ratio(reference)
             if found is None:
@@ -236,7 +236,7 @@ def _ratios(result: CompareResult) -> Figure:
         ax.set_yticks(range(len(rows)), [r.contender.label for r in rows])
         ax.set_ylim(len(rows) - 0.4, -0.8)
         ax.grid(visible=False, axis="y")
-        title = f"{scenario}: over {reference.contender.label}"
+        title = f"{group}: over {reference.contender.label}"
         ax.set_title(title, loc="left", fontweight="bold")
         ax.margins(x=0.08)
         low, high = ax.dataLim.intervalx

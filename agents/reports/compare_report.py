@@ -22,9 +22,13 @@ HEADER = (
 """Names of the columns."""
 
 
-def rows(result: CompareResult, scenario: str) -> list[list[str]]:
-    """Return the table of one scenario, one row per driver and observation mode."""
-    return [_cells(r) for r in result.records if r["scenario"] == scenario]
+def rows(result: CompareResult, group: str) -> list[list[str]]:
+    """Return the table of one group, one row per driver and observation mode."""
+    return [
+        _cells(record)
+        for row, record in zip(result.rows, result.records, strict=True)
+        if row.group == group
+    ]
 
 
 def _cells(record: dict[str, Any]) -> list[str]:
@@ -54,10 +58,10 @@ _LONGEST = 36
 """[-] Longest name of a driver in a terminal, so that no number is truncated."""
 
 
-def short_rows(result: CompareResult, scenario: str) -> list[list[str]]:
-    """Return the table of one scenario for a terminal, without energy and time in contact."""
+def short_rows(result: CompareResult, group: str) -> list[list[str]]:
+    """Return the table of one group for a terminal, without energy and time in contact."""
     lines = []
-    for row, cells in zip(result.of(scenario), rows(result, scenario), strict=True):
+    for row, cells in zip(result.of(group), rows(result, group), strict=True):
         shown = f" on {row.contender.sees}"
         name, room = row.contender.called, _LONGEST - len(shown)
         if len(name) > room:
@@ -72,8 +76,8 @@ def notes(result: CompareResult) -> list[str]:
     """Return notes on the table, one per line."""
     setting = result.rows[0].setting
     by: dict[str, list[str]] = {}
-    for scenario in result.scenarios:
-        by.setdefault(result.reference(scenario).contender.label, []).append(scenario)
+    for group in result.groups:
+        by.setdefault(result.reference(group).contender.label, []).append(group)
     references = "; ".join(f"{label} in {', '.join(names)}" for label, names in by.items())
     last = result.first_seed + result.seeds - 1
     if result.errors_from == "truth":
@@ -82,8 +86,14 @@ def notes(result: CompareResult) -> list[str]:
     else:
         alike, whole = "in the same rounds", "the energy of a car, by its odometer,"
         order = "in rounds, one driver after the other, with real cars"
+    tasks = tuple(dict.fromkeys(row.setting.task for row in result.rows))
+    what = f"Task{'s' if len(tasks) > 1 else ''} {', '.join(tasks)}"
+    if setting.level is not None:
+        what += f", level {setting.level}"
+    if result.protocol is not None:
+        what += f", protocol {result.protocol}"
     lines = [
-        f"Task {setting.task}, {result.seeds} episodes of {setting.seconds:g} s each, {order}; "
+        f"{what}, {result.seeds} episodes of {setting.seconds:g} s each, {order}; "
         "means with 95 % intervals.",
         f"Errors [m] and the time formed (every car's error below {IN_FORMATION:g} m) count from "
         f"{setting.settle:g} s on; {whole} from the start.",
@@ -110,19 +120,20 @@ def compare_files(
     """
     drawn = figures.figures(result)
     names = ", ".join(dict.fromkeys(c.called for c in result.contenders))
-    page = Page(f"Comparison on task {result.rows[0].setting.task}", names)
-    for scenario in result.scenarios:
-        page.heading(scenario)
-        page.table(HEADER, rows(result, scenario))
+    tasks = ", ".join(dict.fromkeys(row.setting.task for row in result.rows))
+    page = Page(f"Comparison on {tasks}", names)
+    for group in result.groups:
+        page.heading(group)
+        page.table(HEADER, rows(result, group))
     for line in notes(result):
         page.text(line)
     for name, (title, figure, caption) in drawn.items():
         page.heading(title)
         page.figure(figure, f"{caption} ({name})")
     filmed = list(zip(result.rows, films, strict=True)) if films else []
-    for n, scenario in enumerate(result.scenarios if films else ()):
-        page.heading(f"Median episodes in {scenario}")
-        drives = {_title(r): frames for r, frames in filmed if r.scenario == scenario}
+    for n, group in enumerate(result.groups if films else ()):
+        page.heading(f"Median episodes in {group}")
+        drives = {_title(r): frames for r, frames in filmed if r.group == group}
         page.raw(player_markup(drives, running=n == 0))
     lines = [*result.records, *result.episode_records]
     return {

@@ -149,18 +149,18 @@ class Scenario:
         new = () if gap is None else gap.wall(self.room)
         return replace(self, gap=gap, obstacles=rest + new)
 
-    def at_level(self, number: int) -> Scenario:
+    def at_level(self, value: int | str) -> Scenario:
         """Return a copy with the randomisation of a curriculum level.
 
         The number of cars is sampled from the numbers that both the level and the room allow.
 
         Args:
-            number: 0 (none) to 4, see `relpos_env.scenarios.levels.LEVELS`.
+            value: 0 (none) to 4, or a name in `relpos_env.scenarios.levels.NAMES`.
 
         Raises:
-            EnvError: There is no level of this number.
+            EnvError: There is no such level.
         """
-        randomisation = level(number)
+        randomisation = level(value)
         if randomisation.n_cars is not None:
             low = max(randomisation.n_cars[0], self.n_cars_range[0])
             high = min(randomisation.n_cars[1], self.n_cars_range[1], most_that_start(self))

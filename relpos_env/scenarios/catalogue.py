@@ -158,5 +158,5 @@ SHIPPED = Catalogue()
 _PRESETS: dict[type, Preset] = {
     ChannelParams: Preset("place", str, lambda name: look_up(CHANNELS, name, "place")),
     Phy: Preset("setting", str, lambda name: look_up(PHYS, name, "setting")),
-    Randomisation: Preset("level", int, level),
+    Randomisation: Preset("level", object, level),
 }

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from relpos_env.errors import EnvError
 from relpos_env.scenarios.randomisation import Randomisation
 
@@ -69,12 +71,25 @@ LEVELS: tuple[Randomisation, ...] = (_EXACT, _NOISE, _ROOMS, _LIFE, _HARD)
 wider ranges and calibration errors."""
 
 
-def level(number: int) -> Randomisation:
-    """Return the randomisation of a level.
+NAMES = {"easy": 1, "medium": 2, "hard": 3, "expert": 4}
+"""Levels by name."""
+
+
+def level_number(value: object) -> int:
+    """Return the number of a level that is given by its number or name.
 
     Raises:
-        EnvError: There is no level of this number.
+        EnvError: There is no such level.
     """
-    if not 0 <= number < len(LEVELS):
-        raise EnvError(f"level: expected 0 to {len(LEVELS) - 1}, got {number}")
-    return LEVELS[number]
+    if isinstance(value, str) and value in NAMES:
+        return NAMES[value]
+    is_bool = isinstance(value, bool)
+    if isinstance(value, int | np.integer) and not is_bool and 0 <= value < len(LEVELS):
+        return int(value)
+    most, names = len(LEVELS) - 1, ", ".join(NAMES)
+    raise EnvError(f"level: expected 0 to {most} or one of {names}, got {value!r}")
+
+
+def level(value: object) -> Randomisation:
+    """Return the randomisation of a level; arguments and errors as of `level_number`."""
+    return LEVELS[level_number(value)]

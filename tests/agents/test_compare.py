@@ -208,7 +208,7 @@ def test_the_median_episode_is_filmed_as_it_was(result):
     assert page.count("<canvas") == 2
     assert page.count("data:image/svg+xml;base64") == 4
     assert len(files["results.jsonl"].splitlines()) == 4 + 12
-    for scenario in result.scenarios:
+    for scenario in result.groups:
         assert {len(line) for line in rows(result, scenario)} == {len(HEADER)}
         assert {len(line) for line in short_rows(result, scenario)} == {len(SHORT_HEADER)}
 
@@ -261,7 +261,7 @@ def test_the_command_line_writes_a_report_and_rows(tmp_path):
         (["consensus", "--observation", "moon"], "--observation: expected one of estimate"),
         (["consensus", "--scenario", "moon"], "scenario: expected one of"),
         (["consensus", "--task", "dance"], "task: expected one of"),
-        (["consensus", "--level", "9"], "level: expected a whole number from 0 to 4"),
+        (["consensus", "--level", "9"], "level: expected 0 to 4 or one of easy"),
         (["consensus", "--cars", "40"], "n_cars: expected a whole number from 2 to 20"),
         (["consensus", "--episodes", "0"], "--episodes: expected 1 to 10000, got 0"),
         (["consensus", "--first-seed", "-1"], "--first-seed: expected 0 or more"),

@@ -150,6 +150,13 @@ def test_the_numbers_of_cars_all_occur():
     assert {int(draw(s, k, slots=3).present.sum()) for k in range(20)} == {2, 3}
 
 
+def test_levels_have_names():
+    s = SCENARIOS["hall"]
+    for number, name in enumerate(("easy", "medium", "hard", "expert"), 1):
+        assert s.at_level(name) == s.at_level(number)
+    assert s.at_level(np.int64(3)) == s.at_level("hard")
+
+
 def test_levels_have_more_and_more():
     assert LEVELS[0] == Randomisation()
     off = Randomisation()
@@ -157,7 +164,7 @@ def test_levels_have_more_and_more():
     assert all(a < b for a, b in zip(on, on[1:], strict=False))
     small = replace(CARS_LOS, n_cars_range=(2, 4)).at_level(4)
     assert small.randomisation.n_cars == (2, 4)
-    with pytest.raises(EnvError, match="level: expected 0 to 4, got 5"):
+    with pytest.raises(EnvError, match="level: expected 0 to 4 or one of easy, .*, got 5"):
         CARS_LOS.at_level(5)
 
 

@@ -50,7 +50,7 @@ class Preset:
 
     key: str
     kind: type
-    """Type of the value: `str` or `int`."""
+    """Type of the value; `object` for any, which `find` checks."""
     find: Callable[[Any], Any]
     """Function from value to base; raises `Where.raises`."""
 
@@ -109,7 +109,7 @@ class TableReader:
             raise _placed(error, where, [f.name for f in fields(kind)]) from error  # type: ignore
 
     def _preset(self, preset: Preset, value: object, where: Where) -> Any:
-        selected = self._value(preset.kind, value, where, None)
+        selected = value if preset.kind is object else self._value(preset.kind, value, where, None)
         try:
             return preset.find(selected)
         except where.raises as error:

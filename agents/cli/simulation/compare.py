@@ -15,7 +15,6 @@ from agents.cli.options import (
     json_option,
     out_options,
     scenario_option,
-    task_option,
 )
 from agents.errors import UsageError
 
@@ -23,12 +22,14 @@ if TYPE_CHECKING:
     from agents.comparison.result import CompareResult
 
 SIMULATED = {
-    "scenarios": "--scenario", "task": "--task", "cars": "--cars", "proximity": "--proximity",
+    "scenarios": "--scenario", "tasks": "--task", "cars": "--cars", "proximity": "--proximity",
     "trackers": "--trackers", "level": "--level", "operator": "--operator",
     "first_seed": "--first-seed", "jobs": "--jobs", "engine": "--engine",
-    "address": "--address",
+    "address": "--address", "protocol": "--protocol",
 }  # fmt: skip
 """Options that are not allowed with real cars, by parameter."""
+SEVERAL = ("scenarios", "tasks", "observations")
+"""Parameters of repeatable options, whose names are in the singular."""
 WHY = "which has its own cars and task; they drive one after the other"
 
 
@@ -43,7 +44,14 @@ WHY = "which has its own cars and task; they drive one after the other"
     help="Observation mode: estimate, estimate_cov, ranges or truth; repeatable.",
 )
 @scenario_option("; repeatable.  [default: that of the task]", "scenarios", multiple=True)
-@task_option
+@click.option(
+    "--task",
+    "tasks",
+    multiple=True,
+    default=("ring",),
+    show_default=True,
+    help="Task: ring, hold, travel, gap, rendezvous or follow; repeatable.",
+)
 @cars_option
 @click.option(
     "--proximity",
@@ -58,7 +66,13 @@ WHY = "which has its own cars and task; they drive one after the other"
     help="group: one tracker receives the samples of all cars; own: one on each car.",
 )
 @click.option(
-    "--level", type=int, help="Curriculum level of the randomisation, 0 to 4, in every scenario."
+    "--level",
+    help="Randomisation in every scenario: easy, medium, hard, expert, or 0 to 4.",
+)
+@click.option(
+    "--protocol",
+    help="Evaluation protocol, 1 or a TOML file, which fixes tasks, observations, trackers, seeds, "
+    "episodes and times.",
 )
 @click.option(
     "--operator", default=1.0, show_default=True, help="Share of episodes with an operator, 0 to 1."
@@ -109,7 +123,8 @@ def compare(
     if config is None:
         if arm:
             raise UsageError("--arm: expected together with --config")
-        result, films = _simulated(names, observations, chosen, filmed=out is not None)
+        chosen = _fixed({"observations": observations, **chosen})
+        result, films = _simulated(names, chosen, filmed=out is not None)
     else:
         result, films = _on_cars(names, observations, config, arm, chosen), []
     if out is not None:
@@ -117,7 +132,7 @@ def compare(
     if as_json:
         emit_json(result.records)
         return
-    for scenario in result.scenarios:
+    for scenario in result.groups:
         print_table(scenario, report.SHORT_HEADER, report.short_rows(result, scenario))
     for line in report.notes(result):
         click.echo(line)
@@ -125,8 +140,33 @@ def compare(
         click.echo(f"written: {out / 'report.html'}")
 
 
+def _fixed(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options with those that a protocol fixes, and the level as a number or name.
+
+    Raises:
+        UsageError: There is no such protocol, or an option that it fixes was given.
+    """
+    from agents.comparison.protocol import protocol_arguments
+
+    level = options.get("level", "")
+    if level.isdecimal():
+        options["level"] = int(level)
+    if "protocol" not in options:
+        return options
+    fixed = protocol_arguments(options["protocol"])
+    context = click.get_current_context()
+    for name in ("scenarios", "cars", "proximity", *fixed):
+        given = context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
+        if given and name != "protocol":
+            option = name.removesuffix("s") if name in SEVERAL else name
+            raise UsageError(
+                f"--{option.replace('_', '-')}: expected without --protocol, which fixes it"
+            )
+    return options | fixed
+
+
 def _simulated(
-    names: tuple[str, ...], observations: tuple[str, ...], options: dict[str, Any], *, filmed: bool
+    names: tuple[str, ...], options: dict[str, Any], *, filmed: bool
 ) -> tuple[CompareResult, list[dict[str, Any]]]:
     """Return the comparison in the simulator, and its films."""
     from agents.comparison.compare import compare as run
@@ -138,7 +178,6 @@ def _simulated(
     with progress_bar("compare", at_once=False) as tell:
         result = run(
             drivers=names,
-            observations=observations,
             scenarios=scenarios,
             ready=lambda: warm_up_first([DEFAULT_FILTER], purpose="env", in_space=False),
             progress=tell,
