@@ -11,7 +11,7 @@ INSTALL := $(PIP) install --no-compile -c constraints.txt
 LEVELS ?= $(if $(filter x86_64 amd64,$(shell uname -m)),x86-64-v2 x86-64-v3 x86-64-v4,generic)
 WARM   ?= --for all
 
-.PHONY: demo demo-hardware test check docs dist lowest format wheel clean
+.PHONY: demo demo-hardware test check docs dist lowest benchmarl format wheel clean
 
 demo: $(VENV)/.core
 	$(BIN)/relpos demo
@@ -54,6 +54,16 @@ lowest: .venv-lowest/.installed
 	@echo "installing the lowest versions into .venv-lowest ..."
 	$(PYTHON) -m venv .venv-lowest
 	.venv-lowest/bin/python -m pip --disable-pip-version-check --quiet install $$($(PYTHON) tests/lowest_versions.py)
+	@touch $@
+
+# Training with BenchMARL, on top of the development tools: it needs an older TorchRL than they have.
+benchmarl: $(VENV)/.dev build/benchmarl/.installed
+	PYTHONPATH=$(abspath build/benchmarl) $(BIN)/python -m pytest tests/relpos_env/test_benchmarl.py
+
+build/benchmarl/.installed: Makefile
+	@rm -rf build/benchmarl
+	$(PIP) install --no-deps --target build/benchmarl benchmarl==1.5.2 torchrl==0.11.1 \
+	  tensordict==0.11.0 hydra-core==1.3.2 omegaconf==2.3.0 antlr4-python3-runtime==4.9.3
 	@touch $@
 
 # A wheel with compiled kernels for common processors; two minutes on two cores for each of them.

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from gymnasium import spaces
 from tensordict import TensorDict, TensorDictBase
-from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
+from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from relpos_env.api.state_space import state_space, truth_inside
@@ -89,7 +89,7 @@ class FormationTorchEnv(EnvBase):  # type: ignore[misc]
                 AGENTS: Composite(
                     {
                         "observation": _bounded(observed, group),
-                        "mask": Binary(shape=group, dtype=torch.bool),
+                        "mask": Categorical(2, group, dtype=torch.bool),
                     },
                     shape=group,
                 ),
