@@ -53,7 +53,8 @@ def test_documented_commands_have_such_options(page, words):
 
 @pytest.mark.parametrize("page", ["README.md", "docs/tutorials/environment.md",
                                   "docs/tutorials/tracking.md",
-                                  "docs/tutorials/notebook.md"])  # fmt: skip
+                                  "docs/tutorials/notebook.md",
+                                  "docs/tutorials/notebook-sb3.md"])  # fmt: skip
 def test_python_of_the_first_pages_runs(page, tmp_path):
     code = "\n".join(blocks(ROOT / page, "python"))
     done = subprocess.run(

@@ -1,8 +1,10 @@
 """BenchMARL: tasks, specs, four algorithms and the command line (`make benchmarl`)."""
 
 import json
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -19,6 +21,7 @@ from relpos_env.errors import EnvError
 from relpos_env.tasks import TASKS
 
 pytestmark = pytest.mark.filterwarnings("ignore")
+ROOT = Path(__file__).parents[2]
 SIZES = {
     "max_n_frames": 400, "evaluation": True, "evaluation_interval": 200, "evaluation_episodes": 2,
     "render": False, "loggers": [], "checkpoint_interval": 0, "checkpoint_at_end": False,
@@ -104,6 +107,16 @@ def test_the_command_line_takes_tasks_and_levels(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "level: easy" in done.stdout
+
+
+def test_the_notebook_runs(tmp_path):
+    page = (ROOT / "docs" / "tutorials" / "notebook-benchmarl.md").read_text()
+    code = "\n".join(re.findall(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE))
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "mean return of the last batch" in done.stdout
 
 
 def test_wrong_arguments_are_named():
