@@ -57,7 +57,8 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
 
     ``offset``: its ranges are 0.6 m too long, as by a wrong calibration. ``outliers``: half of them
     mean nothing, ``made up``: all of them. ``silent``: nothing of it for 3 s. ``frozen``: a pair of
-    it repeats a range, 10 s. ``stuck IMU``: it repeats one reading, 5 s. ``IMU spikes``: one of 100
+    it repeats a range, 10 s. ``dead IMU``: it has no samples
+    any more. ``stuck IMU``: it repeats one reading, 5 s. ``IMU spikes``: one of 100
     readings is random, +-30 rad/s and +-500 m/s2. ``cut off``: its accelerometer reads 3 m/s2 at
     most along x and y.
     """
@@ -67,6 +68,9 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
     of_node = (block.i[0] == node) | (ranges & (block.j[0] == node))
     late = t > FAULT_AT
     hit = np.flatnonzero(of_node & ranges & late)
+    if fault == "dead IMU":
+        own = np.isin(block.kind[0], (Kind.IMU, Kind.MAG)) & (block.i[0] == node)
+        return block.take(~(own & late))
     if fault == "offset":
         block.values[0, hit, 0] += 0.6
     elif fault in ("outliers", "made up"):

@@ -103,6 +103,7 @@ MECHANISMS: dict[str, Callable[[TrackerParams], TrackerParams]] = {
     "fault: position": part("supervision", position_misfit=NEVER),
     "fault: alignment": part("start", respawn_nis=NEVER),
     "group outliers": part("supervision", group_outlier_ratio=2.0),
+    "nodes without an IMU": joint(lambda p: replace(p, blind_after=NEVER)),
     "frozen ranges": part("supervision", frozen_ranges=NEVER),
     "IMU: stuck": sanity(stuck_after=NEVER),
     "IMU: spikes": sanity(gyr_jump=NEVER, acc_jump=NEVER),
@@ -145,7 +146,7 @@ def rows(n_runs: int, names: list[str]) -> Iterator[dict[str, Any]]:
     kinds += ["gliding robot", "gliding human"]
     kinds += [f"world {kind}" for kind in WORLDS]
     faults = ("offset", "outliers", "made up", "silent", "frozen")
-    faults += ("stuck IMU", "IMU spikes", "cut off")
+    faults += ("dead IMU", "stuck IMU", "IMU spikes", "cut off")
     kinds += [f"{kind}, {fault}" for kind in ("cars-nlos", "drones") for fault in faults]
     jobs = [(kind, FIRST + k, names) for kind in kinds for k in range(n_runs)]
     jobs += [(kind, 0, names) for kind in RECORDINGS if (data() / "logs" / kind).is_dir()]

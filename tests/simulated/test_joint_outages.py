@@ -1,13 +1,17 @@
 """Trackers that start, or receive nothing for some time, while the group drives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from agents.evaluation.track import track_log
 from agents.simulation.simulate import simulate
 from tracking import Tracker
 from tracking.ahrs.orientation import Orientation
 from tracking.ahrs.params import OrientationParams
 from tracking.estimate import Status
+from tracking.findings import find_unused
 from tracking.measurements import Kind, MeasurementBlock
 
 BEGIN, END = 14.0, 26.0
@@ -150,3 +154,32 @@ def test_a_look_ahead_past_a_silence_keeps_the_past(make_group):
     smoothed = tracker.smooth(later, now)
     assert np.linalg.norm(before.pos_ij_w[0], axis=-1).min() > 0.1
     assert np.linalg.norm(smoothed.pos_ij_w[0], axis=-1).min() > 0.1
+
+
+def without_imu(log, node, after):
+    block = log.block
+    rows = (block.i[0] == node) & np.isin(block.kind[0], (Kind.IMU, Kind.MAG))
+    return replace(log, block=block.take(~rows | (block.t[0] <= after)))
+
+
+@pytest.mark.parametrize("after", [-1.0, 20.0])
+@pytest.mark.parametrize("seed", [13, 20])
+def test_of_three_cars_one_without_an_imu_may_be_on_either_side(seed, after):
+    """Its layout is right but for reflection, so it is ambiguous, not ok."""
+    log = without_imu(simulate(scenario="cars-los", seconds=40.0, seed=seed), 1, after)
+    (found,) = find_unused(log)
+    assert (found.name, found.nodes) == ("no-imu", (log.constellation.ids[1],))
+    result = track_log(log, findings=[])
+    late = result.estimate.status[result.estimate.t > max(after, 0.0) + 3.0]
+    i, j = log.constellation.pairs.T
+    assert (late[:, (i == 1) | (j == 1)] == Status.AMBIGUOUS).mean() > 0.95
+    assert result.score.integrity_share < 0.003
+    assert result.score.rmse_mirror < 0.15
+
+
+def test_of_four_cars_one_without_an_imu_is_found_by_the_others():
+    log = simulate(scenario="hall", cars=4, seconds=30.0, seed=4)
+    result = track_log(without_imu(log, 1, -1.0), findings=[])
+    assert result.score.ok_share > 0.6
+    assert result.score.integrity_share < 0.01
+    assert result.score.rmse_yaw < 0.25

@@ -88,7 +88,9 @@ def test_times_that_repeat_or_jitter_are_said(jitter, repeats, count):
 def test_what_cannot_be_used_is_said():
     t = np.arange(0.0, SECONDS, 0.01)
     assert find_unused(log_of([(0, t), (1, t)], [(0, t), (1, t)])) == []
-    assert find_unused(log_of([(0, t)], heading="initial", headings=(0.3, None))) == []
+    [found] = find_unused(log_of([(0, t)], heading="initial", headings=(0.3, None)))
+    assert (found.name, found.nodes) == ("no-imu", (2,))
+    assert found.text.startswith("node 2: no IMU samples")
     [found] = find_unused(log_of([(0, t), (1, t)], [(0, t)]))
     assert (found.name, found.nodes) == ("no-magnetometer", (2,))
     assert found.text.startswith("node 2: no magnetometer")

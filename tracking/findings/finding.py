@@ -93,7 +93,8 @@ KINDS: dict[str, Kind] = {
     ),
     "no-imu": Kind(
         "note",
-        "ranges alone determine neither the rotation nor the reflection of a group",
+        "ranges alone determine neither the rotation nor the reflection of a group, and of three "
+        "nodes not the side of one without an IMU",
         "record the IMU",
     ),
     "no-heading": Kind(

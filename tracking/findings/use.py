@@ -12,6 +12,8 @@ from tracking.findings.finding import Finding, names
 from tracking.log.folder import Log
 from tracking.measurements import Kind
 
+LONGEST_SILENCE = 5.0
+"""[s] Longest time between the last samples and the last ranges of a node."""
 MOST_REFUSED = 0.2
 """[-] Largest share of rejected ranges; tracked recordings have up to 0.02, a lost one 0.5."""
 
@@ -31,6 +33,8 @@ def find_unused(log: Log) -> list[Finding]:
             "the reflection of the group: pairs stay ambiguous; rmse_mirror is what can be judged"
         )
         found.append(Finding("no-imu", (), text))
+    else:
+        found += find_without_imu(log)
     if constellation.heading == "initial":
         unknown = [n for n in with_imu if constellation.nodes[n].initial_heading is None]
         ids = tuple(constellation.ids[n] for n in unknown)
@@ -46,6 +50,27 @@ def find_unused(log: Log) -> list[Finding]:
         if ids:
             text = f"{names(ids)}: no magnetometer readings, so the IMU is not used"
             found.append(Finding("no-magnetometer", ids, text))
+    return found
+
+
+def find_without_imu(log: Log) -> list[Finding]:
+    """Find moving nodes without samples, or whose samples end long before their ranges."""
+    block, constellation, found = log.block, log.constellation, list[Finding]()
+    t, valid = block.t[0], block.valid[0]
+    sampled = valid & np.isin(block.kind[0], (Kind.IMU, Kind.STATE))
+    ranged = valid & (block.kind[0] == Kind.RANGE)
+    for n in np.flatnonzero(~constellation.is_static):
+        samples, node = t[sampled & (block.i[0] == n)], constellation.ids[n]
+        ranges = t[ranged & ((block.i[0] == n) | (block.j[0] == n))]
+        if not len(ranges) or (len(samples) and samples[-1] > ranges[-1] - LONGEST_SILENCE):
+            continue
+        what = f"its IMU samples end at {samples[-1]:.1f} s" if len(samples) else "no IMU samples"
+        text = (
+            f"node {node}: {what}, its ranges at {ranges[-1]:.1f} s: without them its side of the "
+            f"others stays open, unless more than {constellation.dimensions} others have an IMU or "
+            "rest"
+        )
+        found.append(Finding("no-imu", (node,), text))
     return found
 
 

@@ -10,7 +10,7 @@ from tracking.filters.joint.hypotheses.alignment import LINEAR, MODES, NONE, STA
 from tracking.filters.joint.state import JointState
 from tracking.filters.joint.supervision.residuals import group_outlier_ratio
 from tracking.kernels.addresses import by_reference
-from tracking.kernels.jit import kernel
+from tracking.kernels.jit import kernel, small_kernel
 from tracking.maths.covariance import apply_downdate
 
 # Plain numbers of `Status`: kernels do not know enums.
@@ -31,6 +31,7 @@ def write_estimate(c, s, work, t, e, o, out):
     if group.alignment != NONE:
         predict_estimate(c, s, work, t)
     x, P = work.x[0], work.P[0]
+    few_see, some_never_saw = who_sees(c, s, t)
     is_group_doubtful = group_outlier_ratio(c, s, t) > c.group_outlier_ratio
     for p in range(s.pairs.shape[0]):
         pair = s.pairs[p]
@@ -61,6 +62,8 @@ def write_estimate(c, s, work, t, e, o, out):
             status[e, o, p] = AMBIGUOUS
         elif node_i.static and node_j.static:
             status[e, o, p] = OK
+        elif few_see and (some_never_saw or is_blind(c, node_i, t) or is_blind(c, node_j, t)):
+            status[e, o, p] = AMBIGUOUS
         elif age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval):
             status[e, o, p] = LOST
         elif (
@@ -74,6 +77,29 @@ def write_estimate(c, s, work, t, e, o, out):
             status[e, o, p] = LOST
         else:
             status[e, o, p] = OK
+
+
+@small_kernel
+def is_blind(c, node, t):
+    """True for a moving node without IMU samples for a while."""
+    return not node.static and (not node.has_state or t - node.t_state > c.blind_after)
+
+
+@small_kernel
+def who_sees(c, s, t):
+    """Return whether too few nodes have an IMU or are static, and whether a moving one never had.
+
+    The motion of a node without an IMU is modelled as white acceleration, which does not tell a
+    path from its mirror image. Distances to more other nodes than dimensions do. A group that
+    started with such a node may be turned wrongly as a whole.
+    """
+    n_seeing, some_never = 0, False
+    for i in range(s.nodes.shape[0]):
+        node = s.nodes[i]
+        if node.present:
+            some_never |= not (node.static or node.has_state)
+            n_seeing += 0 if is_blind(c, node, t) else 1
+    return n_seeing <= c.d, some_never
 
 
 @kernel

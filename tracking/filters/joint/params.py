@@ -253,6 +253,9 @@ class JointParams:
     (`OrientationParams.max_gap`). Larger: it goes on over longer gaps."""
     imu_timeout: float = 0.3
     """[s] IMU silence that makes a node unaided; larger: its last acceleration is held longer."""
+    blind_after: float = 2.0
+    """[s] IMU silence after which a moving node does not tell a layout from its mirror image: pairs
+    are `ambiguous` unless more nodes than dimensions do. Larger: they stay `ok` for longer."""
     static_drift: float = 1e-4
     """[m/sqrt(s)] Random walk of static nodes: P stays positive; larger: ranges move them more."""
     survey_std: float = 0.02
