@@ -57,10 +57,9 @@ def spoiled(block: Any, fault: str, seed: int) -> Any:
 
     ``offset``: its ranges are 0.6 m too long, as by a wrong calibration. ``outliers``: half of them
     mean nothing, ``made up``: all of them. ``silent``: nothing of it for 3 s. ``frozen``: a pair of
-    it repeats a range, 10 s. ``dead IMU``: it has no samples
-    any more. ``stuck IMU``: it repeats one reading, 5 s. ``IMU spikes``: one of 100
-    readings is random, +-30 rad/s and +-500 m/s2. ``cut off``: its accelerometer reads 3 m/s2 at
-    most along x and y.
+    it repeats a range, 10 s. ``dead IMU``: it has no samples any more. ``stuck
+    IMU``: it repeats one reading, 5 s. ``IMU spikes``: one of 100 readings is random, +-30 rad/s
+    and +-500 m/s2. ``cut off``: its accelerometer reads 3 m/s2 at most along x and y.
     """
     rng, node = np.random.default_rng(seed), 0
     block = replace(block, values=block.values.copy())  # the run without the fault is cached

@@ -16,8 +16,9 @@ CAPTIONS = {
     "world": "The second world (`tests/second_world`, mounts unknown):",
     "cars-nlos": "Cars of which one is at fault from 25 s on: ranges 0.6 m too long (offset), half "
     "of them random (outliers), all of them (made up), no range for 3 s (silent), one pair that "
-    "repeats a range for 10 s (frozen), an IMU that falls silent for good (dead IMU), one that repeats a reading for 5 s (stuck IMU), 1 % of "
-    "IMU readings random (IMU spikes), an accelerometer that reads at most 3 m/s2 (cut off):",
+    "repeats a range for 10 s (frozen), an IMU that falls silent for good (dead IMU), one that "
+    "repeats a reading for 5 s (stuck IMU), 1 % of IMU readings random (IMU spikes), an "
+    "accelerometer that reads at most 3 m/s2 (cut off):",
     "drones": "Drones with the same faults:",
 }
 """Group of runs to the sentence before its table."""
