@@ -106,7 +106,10 @@ def test_files_extend_files_and_move_the_wall_along(tmp_path):
         (ROOM + '[radio.channel]\nplace = "moon"', "radio.channel.place: expected one of cal"),
         (ROOM + "[radio.channel]\nloss = 2", "radio.channel.loss: expected 0 to 1, got 2"),
         (ROOM + "[radio.session]\npan = -1", "radio.session.pan: expected 0 to 65535"),
-        (ROOM + "[randomisation]\nlevel = 9", "randomisation.level: expected 0 to 4, got 9"),
+        (
+            ROOM + "[randomisation]\nlevel = 9",
+            "randomisation.level: expected 0 to 4 or one of easy, medium, hard, expert, got 9",
+        ),
         (ROOM + "[randomisation]\nmass = [2, 1]", "randomisation.mass: expected 0.01 <= low"),
         (ROOM + "[gap]\nwidth = 9.0", "gap.width: expected less than 4.98 m"),
         (ROOM + "[gap]\nwidth = 0.001", "gap.width: expected 0.05 to 100 m"),
