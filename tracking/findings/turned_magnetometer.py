@@ -32,8 +32,8 @@ LEAST_GAIN = 0.01
 """[-] Least gain in log-likelihood of a range."""
 NEGLIGIBLE = np.radians(10.0)
 """[rad] Largest turn that counts as none: a heading error that the filter estimates."""
-MOST_NODES = 8
-"""[-] Largest group whose nodes are tried."""
+FEWEST_NODES, MOST_NODES = 3, 8
+"""[-] Fewest and most nodes with an IMU and a magnetometer that are compared."""
 
 
 def correct_magnetometers(log: Log, progress: Progress) -> tuple[Log, list[Finding]]:
@@ -51,7 +51,7 @@ def correct_magnetometers(log: Log, progress: Progress) -> tuple[Log, list[Findi
     group = log.constellation
     kind, node = log.block.kind[0], log.block.i[0]
     measured = np.intersect1d(node[kind == Kind.MAG], node[kind == Kind.IMU]).tolist()
-    if group.n_nodes < 3 or len(measured) > MOST_NODES or group.heading != "magnetic":
+    if not FEWEST_NODES <= len(measured) <= MOST_NODES or group.heading != "magnetic":
         return log, []
     left = [n for n in measured if VEHICLES[group.nodes[n].vehicle].levelled]
     found = list[Finding]()
