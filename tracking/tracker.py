@@ -1,6 +1,6 @@
 """The tracker: orientation stage, then position filter.
 
-    block -> Orientation (IMU to state) -> Filter (pair EKFs, MDS) -> TeamEstimate
+    block -> Orientation (IMU to state) -> Filter (one joint EKF, or others) -> TeamEstimate
 
 `Horizon` puts late data in order upstream of the tracker.
 """

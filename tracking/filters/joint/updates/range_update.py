@@ -4,7 +4,7 @@
 
 with the antenna offsets l rotated by the nodes' orientations and heading errors, and p at the time
 of the range, predicted from states that may be a little older (`event_loop.predict_to`). NLOS adds
-a bias (`nlos_model`) and, in proportion to its probability, white noise. The noise is divided by
+a bias (`range_errors`) and, in proportion to its probability, white noise. The noise is divided by
 the probability that the range is no outlier, so an outlier hardly counts.
 """
 
