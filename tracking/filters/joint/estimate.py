@@ -32,6 +32,7 @@ def write_estimate(c, s, work, t, e, o, out):
         predict_estimate(c, s, work, t)
     x, P = work.x[0], work.P[0]
     few_see, some_never_saw = who_sees(c, s, t)
+    is_open = group.n_alive > 1 or group.alignment in (STATIC, LINEAR, MODES)
     is_group_doubtful = group_outlier_ratio(c, s, t) > c.group_outlier_ratio
     for p in range(s.pairs.shape[0]):
         pair = s.pairs[p]
@@ -58,13 +59,10 @@ def write_estimate(c, s, work, t, e, o, out):
                 cov[e, o, p, q, r] = v
             if a < d:
                 squared_error += cov[e, o, p, a, a]
-        if group.n_alive > 1 or group.alignment in (STATIC, LINEAR, MODES):
+        is_blind_pair = some_never_saw or is_blind(c, node_i, t) or is_blind(c, node_j, t)
+        if is_open or (few_see and is_blind_pair):
             status[e, o, p] = AMBIGUOUS
-        elif node_i.static and node_j.static:
-            status[e, o, p] = OK
-        elif few_see and (some_never_saw or is_blind(c, node_i, t) or is_blind(c, node_j, t)):
-            status[e, o, p] = AMBIGUOUS
-        elif age[e, o, p] > max(c.lost_after, c.missed_intervals * pair.interval):
+        elif is_silent_pair(c, pair, node_i, node_j, age[e, o, p]):
             status[e, o, p] = LOST
         elif (
             is_group_doubtful
@@ -73,10 +71,25 @@ def write_estimate(c, s, work, t, e, o, out):
             or node_j.fault != 0
         ):
             status[e, o, p] = DOUBTFUL
-        elif squared_error > max(node_i.accuracy, node_j.accuracy) ** 2:
+        elif squared_error > accuracy_of(node_i, node_j) ** 2:
             status[e, o, p] = LOST
         else:
             status[e, o, p] = OK
+
+
+@small_kernel
+def is_silent_pair(c, pair, node_i, node_j, age):
+    """True if a pair had no range lately; static nodes need none of each other."""
+    is_fixed = node_i.static and node_j.static
+    return not is_fixed and age > max(c.lost_after, c.missed_intervals * pair.interval)
+
+
+@small_kernel
+def accuracy_of(node_i, node_j):
+    """Return the expected error up to which a pair is ok [m]; moving nodes decide it."""
+    if node_i.static != node_j.static:
+        return node_j.accuracy if node_i.static else node_i.accuracy
+    return max(node_i.accuracy, node_j.accuracy)
 
 
 @small_kernel

@@ -180,7 +180,7 @@ def make_state(
             "slip": slip,
             "slip_var": slip_std**2,
             "aside": node.mount.aside,
-            "accuracy": 0.0 if static else params.accuracy or carrier.accuracy,
+            "accuracy": params.accuracy or carrier.accuracy,
             "i_pos": at,
             "i_vel": -1 if static else at + d,
             "i_tilt_bias": -1 if static else fades,
