@@ -76,6 +76,10 @@ class Constellation:
         ids = [node.id for node in self.nodes]
         _expect(2 <= len(ids) <= MOST_NODES, f"nodes: expected 2 to {MOST_NODES}, got {len(ids)}")
         _expect(len(set(ids)) == len(ids), f"nodes: ids must differ, got {ids}")
+        for k in ids:
+            _expect(
+                isinstance(k, int | np.integer) and k >= 0, f"nodes.id: expected 0 or more, got {k}"
+            )
         _expect(self.dimensions in (2, 3), f"dimensions: expected 2 or 3, got {self.dimensions!r}")
         _expect(
             self.heading in ("magnetic", "initial"),

@@ -117,9 +117,14 @@ class TeamEstimate:
     def between(self, i: int, j: int) -> tuple[F64, F64]:
         """Return position and velocity of node j relative to i in the world frame, each (..., 3).
 
+        Args:
+            i: Index of a node in `constellation.nodes`, `constellation.index_of[id]`.
+            j: Index of another node.
+
         Raises:
-            ConfigError: i and j are equal.
+            ConfigError: i and j are equal, or there is no such node.
         """
+        self._check_nodes("between", i, j)
         if i == j:
             raise ConfigError(f"between: expected two different nodes, got {i} twice")
         pair = self.constellation.pair_index[i, j]
@@ -134,7 +139,14 @@ class TeamEstimate:
 
     def relative_orientation(self, i: int, j: int) -> F64:
         """Return q_ij = q_i^-1 q_j, the orientation of body j in body frame i, (..., 4)."""
+        self._check_nodes("relative_orientation", i, j)
         return quat_multiply(quat_conjugate(self.q_wb[..., i, :]), self.q_wb[..., j, :])
+
+    def _check_nodes(self, method: str, *indices: int) -> None:
+        n = self.constellation.n_nodes
+        for k in indices:
+            if not 0 <= k < n:
+                raise ConfigError(f"{method}: expected node indices 0 to {n - 1}, got {k}")
 
     def at(self, t: F64 | float) -> TeamEstimate:
         """Predict the estimate at another time with constant velocity.

@@ -4,7 +4,8 @@ Time is reversed for the second pass: orientations and accelerations are kept, v
 and gyroscope biases change sign, and JOIN and LEAVE are exchanged, so the joint filter itself runs
 it. The errors of both passes are independent but for common priors, so their information adds up
 for position and velocity of every pair: a two-filter smoother [1]. Each pass supplies rotation and
-reflection of a group for the times at which the other has not found them.
+reflection of a group for the times at which the other has not found them. A pair that one pass
+never finds stays ambiguous.
 
 References:
     [1] Fraser, Potter, The optimum linear smoother as a combination of two optimum linear filters,
@@ -123,10 +124,16 @@ def _together(forward: TeamEstimate, back: TeamEstimate, accuracy: F64) -> TeamE
     status = np.where(error <= accuracy, Status.OK, Status.LOST)
     doubted = (forward.status == Status.DOUBTFUL) & (back.status[::-1] == Status.DOUBTFUL)
     status = np.where(doubted | differ, Status.DOUBTFUL, status)
-    both_static = forward.constellation.is_static[forward.constellation.pairs].all(axis=1)
-    status = np.where(both_static, Status.OK, status)
+    # Both passes have all data: an image that one of them never finds is not known.
+    is_found = has_ok(forward) & has_ok(back)
+    status = np.where((status == Status.OK) & ~is_found, Status.AMBIGUOUS, status)
     status = np.where(none, forward.status, status).astype(forward.status.dtype)
     return replace(forward, pos_ij_w=pos, vel_ij_w=vel, cov=full, status=status)
+
+
+def has_ok(estimate: TeamEstimate) -> Bool:
+    """Return which pairs are `ok` at any time of a pass, (pair)."""
+    return np.asarray((estimate.status == Status.OK).any(axis=0))
 
 
 def _agree(

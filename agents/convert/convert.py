@@ -13,14 +13,14 @@ import numpy as np
 from agents.convert.arrays import Arrays
 from agents.convert.bags import Bag
 from agents.convert.captures import Capture
-from agents.convert.log import build_log
-from agents.convert.mapping import OF_CAPTURES, Mapping, Plan, read_plan
+from agents.convert.log import build_log, check_log
+from agents.convert.mapping import OF_CAPTURES, TABLES, Mapping, Plan, read_plan
 from agents.convert.rows import read_rows
 from agents.convert.sources import Source, pattern
 from agents.convert.tables import Tables
 from agents.errors import UsageError
 from tracking.arrays import F64
-from tracking.errors import ConfigError
+from tracking.errors import ConfigError, LogError
 from tracking.log import Log, check_target, write_log
 from tracking.measurements import Kind
 
@@ -31,7 +31,6 @@ KINDS: dict[str, Callable[[Path, Mapping], Source]] = {
     "capture": lambda path, mapping: Capture(path, mapping.capture),
 }
 """Reader by kind of recording."""
-ITEMS = ("imu", "mag", "state", "ranges", "truth")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,13 +101,17 @@ def convert(
         tables, used = _read(plan, opened, progress or (lambda _: None))
         taken = {stream for use in used for stream in use.streams}
         unused = tuple(name for name in opened.names() if name not in taken)
+    for use in used:
+        if not use.rows and not use.left_out:
+            raise UsageError(f"[[{use.table}]] {', '.join(use.streams)}: expected rows, found none")
     if "ranges" not in tables:
         left_out = sum(use.left_out for use in used if use.table == "ranges")
         text = f"found none and {left_out} that are invalid or of other nodes"
         raise UsageError(f"ranges: expected some between nodes of the mapping, {text}")
     try:
         log = build_log(plan, tables, restamp)
-    except ConfigError as error:
+        check_log(log)
+    except (ConfigError, LogError) as error:
         raise UsageError(str(error)) from error
     if out is not None:
         write_log(out, log, overwrite=overwrite)
@@ -126,7 +129,7 @@ def _read(
     plan: Plan, source: Source, progress: Callable[[float], None]
 ) -> tuple[dict[str, F64], list[StreamUse]]:
     """Return the rows of each table that is not empty, and what became of each entry."""
-    items = [(name, item) for name in ITEMS for item in getattr(plan.mapping, name)]
+    items = [(name, item) for name in TABLES for item in getattr(plan.mapping, name)]
     parts: dict[str, list[F64]] = {}
     used = []
     for k, (name, item) in enumerate(items):

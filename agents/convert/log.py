@@ -9,11 +9,15 @@ import numpy as np
 from agents.convert.mapping import Plan
 from tracking.arrays import F64, I64
 from tracking.constellation import Constellation
+from tracking.errors import LogError
 from tracking.log import Log
-from tracking.log.inertial import in_body_axes
+from tracking.log.inertial import check_inertial, in_body_axes, with_rates
 from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.sanity.measurements import FARTHEST
 
+MOST_WRONG = 0.5
+"""[-] Largest share of impossible ranges; the reader leaves them out."""
 LONG_GAP = 10.0
 """[-] Longest gap within one line fit, in sample periods of an IMU."""
 OF_ONE_NODE = {"imu": Kind.IMU, "mag": Kind.MAG, "state": Kind.STATE}
@@ -61,6 +65,23 @@ def build_log(plan: Plan, tables: dict[str, F64], restamp: bool) -> Log:
         block=block.take(block.order()[0]),
         truth=_truth(group, places, tables.get("truth", np.zeros((0, 9)))),
     )
+
+
+def check_log(log: Log) -> None:
+    """Check the units and clocks of a converted log, as far as its reader does.
+
+    Raises:
+        LogError: Most ranges are impossible, or inertial samples are on another clock.
+    """
+    metres = log.block.values[0, log.block.kind[0] == Kind.RANGE, 0]
+    wrong = np.mean(~((metres > 0.0) & (metres <= FARTHEST)))
+    if wrong > MOST_WRONG:
+        raise LogError(
+            f"[[ranges]]: {wrong:.0%} are not within 0 to {FARTHEST:g} m, median "
+            f"{np.median(metres):g}; expected metres, see scale"
+        )
+    check_inertial(log.block, log.constellation)
+    with_rates(log.constellation, log.block)
 
 
 def _seen(group: Constellation, tables: dict[str, F64], surveyed: set[int]) -> Constellation:

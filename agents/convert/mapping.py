@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +18,9 @@ PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 OF_META = ("format", "name", "source", "licence", "dimensions", "heading", "nodes", "antennas",
            "range_noise_m")  # fmt: skip
 """Keys of meta.toml that a mapping has as well."""
+TABLES = ("imu", "mag", "state", "ranges", "truth")
+"""Tables of a mapping, each with the entries of one kind."""
+SCALES = ("scale", "gyr_scale", "acc_scale")
 Fields = tuple[str, ...]
 """Names of fields whose numbers are concatenated; a minus before a name negates them."""
 
@@ -183,7 +187,25 @@ def read_plan(preset: str | None, file: Path | None) -> Plan:
             raise where.key("places").key(key).error("expected a node of [nodes] and [x, y, z]")
     if mapping.kind != "capture" and not mapping.ranges:
         raise where.key("ranges").error("missing, expected [[ranges]]")
+    _check_numbers(mapping, where)
     for k, ranges in enumerate(mapping.ranges):
         if bool(ranges.range) + bool(ranges.mean_of) + bool(ranges.pairs) != 1:
             raise where.key(f"ranges[{k}]").error("expected one of range, mean_of, pairs")
     return Plan(mapping, meta, ids, {int(k): (v[0], v[1], v[2]) for k, v in places.items()})
+
+
+def _check_numbers(mapping: Mapping, where: Where) -> None:
+    """Check that every stream has times, and that scales and rates are possible."""
+    for table in TABLES:
+        for k, item in enumerate(getattr(mapping, table)):
+            at = where.key(f"{table}[{k}]")
+            if not 0.0 <= item.rate < inf:
+                raise at.key("rate").error(f"expected 0 or more Hz, got {item.rate:g}")
+            if mapping.kind in ("tables", "arrays") and not (mapping.time or item.rate):
+                raise where.key("time").error(
+                    f"missing, expected the field with the time [s], or rate in [[{table}]]"
+                )
+            for key in SCALES:
+                scale = getattr(item, key, 1.0)
+                if not 0.0 < scale < inf:
+                    raise at.key(key).error(f"expected a factor above 0, got {scale:g}")

@@ -13,8 +13,9 @@ from tracking.arrays import Bool
 from tracking.constellation import Constellation
 from tracking.errors import LogError
 from tracking.log import Log, read_log, write_log
-from tracking.log.read import MAX_ACC, MAX_DISTANCE, MAX_GYR, MAX_MAG
+from tracking.log.read import MAX_ACC, MAX_GYR, MAX_MAG
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.sanity.measurements import FARTHEST
 
 N_COLUMNS = 7
 """Number of value columns of a log; the tracker computes the eighth again."""
@@ -83,7 +84,7 @@ def _fits(block: MeasurementBlock, constellation: Constellation) -> Bool:
     good = np.isin(kind, (Kind.JOIN, Kind.LEAVE))
     static = constellation.is_static
     with np.errstate(invalid="ignore"):
-        ranged = (values[:, 0] > 0.0) & (values[:, 0] <= MAX_DISTANCE) & (i != j)
+        ranged = (values[:, 0] > 0.0) & (values[:, 0] <= FARTHEST) & (i != j)
         good |= (kind == Kind.RANGE) & ranged
         good |= (kind == Kind.SURVEY) & ranged & static[i] & static[j]
         for one, limits in _LIMITS.items():

@@ -222,6 +222,15 @@ def _variance(kind):
             lambda s: s.replace('["gx", "gy", "gz"]', '["gx", "gy"]'),
             "gyr: expected 3 numbers, got 2",
         ),
+        (lambda s: s.replace('time = "t"', ""), r"time: missing, expected the field .* or rate"),
+        (
+            lambda s: s.replace("scale = 0.001", "scale = 0.0"),
+            r"ranges\[0\]\.scale: expected a factor above 0, got 0",
+        ),
+        (
+            lambda s: s.replace("scale = 0.001", "scale = 1.0"),
+            r"ranges.*not within 0 to 1000 m, median 2000; expected metres, see scale",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused_by_name(folder, change, message):
@@ -241,6 +250,11 @@ def test_what_makes_no_sense_is_refused_by_name(folder, change, message):
         (
             lambda text: text + b"soon,1,2,3,1\n",
             "uwb.csv row 7, t: expected a number, found 'soon'",
+        ),
+        (lambda text: text.split(b"\n")[0], r"\[\[ranges\]\] uwb: expected rows, found none"),
+        (
+            lambda text: text.replace(b"1700000000", b"1800000000"),
+            r"imu\.csv, t_s: samples from 0 to .*, ranges from 1e\+08 .* expected one clock",
         ),
     ],
 )

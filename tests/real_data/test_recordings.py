@@ -2,6 +2,7 @@
 
 import csv
 import gzip
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -166,3 +167,23 @@ def test_orientation_figures_of_broad(data, trial):
     heading = np.angle(np.exp(1j * (heading - np.angle(np.mean(np.exp(1j * heading))))))
     figures = np.degrees([np.sqrt(np.mean(inclination**2)), np.std(heading)])
     np.testing.assert_allclose(figures, BROAD[trial], atol=0.02)
+
+
+@pytest.mark.parametrize("name", ["isas_walk1", "inrol_env1"])
+@pytest.mark.parametrize("late", [1.0, -2.0])
+def test_an_imu_on_another_clock_is_refused(data, name, late):
+    """So far off, likelihoods have no slope towards the right clock."""
+    log = read_log(data / "logs" / name)
+    t = log.block.t + late * np.isin(log.block.kind, (Kind.IMU, Kind.MAG))
+    moved = replace(log.block, t=t)
+    _, found = examine(replace(log, block=moved.take(moved.order()[0])))
+    assert [f.name for f in found if f.severity == "error"] == ["clock-offset"]
+
+
+def test_an_image_that_one_pass_never_finds_is_not_ok_in_hindsight(data):
+    """The path of this rig stays in a plane: the backward pass would be wrong in its first half."""
+    log, found = examine(read_log(data / "logs" / "starloc_fast1"))
+    for smooth in (None, "all"):
+        result = track_log(log, findings=found, smooth=smooth)
+        assert result.score.integrity_share <= 0.01
+        assert "degenerate-motion" in {f.name for f in result.findings}

@@ -83,6 +83,16 @@ def test_units_and_axes_that_make_estimates_wrong_are_refused(drive, factors, na
         track_log(wrong)
 
 
+@pytest.mark.parametrize("name", ["cars-los", "human"])
+def test_rates_in_degrees_are_named_in_a_log_that_is_read(tmp_path, name):
+    """The reader must not leave out the samples that show the unit."""
+    log = simulate(scenario=name, seconds=12.0, seed=20)
+    write_log(tmp_path / "log", with_samples(log, Kind.IMU, scaled(57.3, 57.3, 57.3)))
+    errors = [f for f in examine(read_log(tmp_path / "log"))[1] if f.severity == "error"]
+    assert {f.name for f in errors} == {"gyro-units"}
+    assert {n for f in errors for n in f.nodes} == set(log.constellation.ids)
+
+
 def test_a_length_of_gravity_that_is_a_little_wrong_is_a_warning(drive):
     long = with_samples(drive, Kind.IMU, scaled(1, 1, 1, 1.08, 1.08, 1.08))
     _, found = examine(long)

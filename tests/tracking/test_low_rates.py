@@ -10,6 +10,7 @@ from tracking import Constellation, NodeConfig, Status, Tracker
 from tracking.estimate import TeamEstimate
 from tracking.findings import find_in_estimates, find_unused
 from tracking.findings.ambiguity import find_ambiguous
+from tracking.findings.truth import find_truth_errors
 from tracking.log import Log
 from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
@@ -81,8 +82,8 @@ def test_a_truth_on_another_clock_is_a_finding():
     t, no = np.arange(0.0, 4.0, 0.5), np.zeros(8)
     truth = Truth(t, no.astype(int), np.zeros((8, 3)), np.zeros((8, 4)), no > 1, no < 1)
     log = Log(name="late", constellation=group.constellation, block=group.block, truth=truth)
-    assert find_unused(log) == []
-    (found,) = find_unused(replace(log, truth=replace(truth, t=t + 1e9)))
+    assert find_truth_errors(log) == []
+    (found,) = find_truth_errors(replace(log, truth=replace(truth, t=t + 1e9)))
     assert found.name == "truth-clock"
     assert "no time in common" in found.text
 
@@ -135,3 +136,6 @@ def test_a_node_that_moves_in_a_plane_among_static_ones_is_a_finding(up):
     (found,) = find_ambiguous(log, estimate)
     assert found.name == ("degenerate-motion" if up < 0.1 else "undecided-layout")
     assert found.nodes == (9,)
+    estimate.status[...] = Status.OK
+    names = [f.name for f in find_ambiguous(log, estimate)]
+    assert names == (["degenerate-motion"] if up < 0.1 else [])

@@ -10,6 +10,7 @@ from tracking.findings.imu_against_ranges import find_suspects, find_wrong_axes
 from tracking.findings.ranges import find_range_errors
 from tracking.findings.stamps import find_bad_stamps
 from tracking.findings.trials import Progress
+from tracking.findings.truth import find_truth_errors
 from tracking.findings.turned_magnetometer import correct_magnetometers
 from tracking.findings.use import find_in_estimates, find_unused
 from tracking.log.folder import Log
@@ -27,7 +28,9 @@ def examine(log: Log, progress: Progress = lambda share: None) -> tuple[Log, lis
         and the findings.
     """
     log, at_rest = correct_at_rest(log)
-    found = [*find_unused(log), *find_bad_stamps(log), *at_rest, *find_gyroscope(log)]
+    found = [*find_unused(log), *find_truth_errors(log), *find_bad_stamps(log), *at_rest]
+    if not any(f.name == "gyro-units" for f in found):
+        found += find_gyroscope(log)
     if any(f.severity == "error" for f in found):
         return log, found  # the next checks need sensors without errors
     suspects = find_suspects(log, _part(progress, 0.0, 0.2))

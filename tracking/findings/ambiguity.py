@@ -1,10 +1,10 @@
-"""Why pairs stay ambiguous: the layout, or the motion of the nodes with an IMU, is degenerate."""
+"""Why an image is open: the layout, or the motion of the nodes with an IMU, is degenerate."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tracking.arrays import F64, Bool
+from tracking.arrays import F64, I64, Bool
 from tracking.estimate import Status, TeamEstimate
 from tracking.findings.finding import Finding, names
 from tracking.log.folder import Log
@@ -19,7 +19,7 @@ LARGEST_STEP = 0.3
 
 
 def find_ambiguous(log: Log, estimate: TeamEstimate) -> list[Finding]:
-    """Find why a layout stays ambiguous.
+    """Find why a layout stays ambiguous, and motion from which no image is certain.
 
     Args:
         log: The recording.
@@ -31,8 +31,12 @@ def find_ambiguous(log: Log, estimate: TeamEstimate) -> list[Finding]:
     if constellation.n_nodes <= constellation.dimensions or not placed.any():
         return []
     if open_sides.mean() <= MOST_AMBIGUOUS:
-        return []
-    return _flat_layout(estimate, open_sides) or _undecided(log, estimate, placed, open_sides)
+        return _flat_motion(log, estimate, placed)
+    return (
+        _flat_layout(estimate, open_sides)
+        or _flat_motion(log, estimate, placed)
+        or _undecided(log, open_sides)
+    )
 
 
 def _flat_layout(estimate: TeamEstimate, open_sides: Bool) -> list[Finding]:
@@ -54,28 +58,41 @@ def _flat_layout(estimate: TeamEstimate, open_sides: Bool) -> list[Finding]:
     return [Finding("degenerate-layout", (), text)]
 
 
-def _undecided(log: Log, estimate: TeamEstimate, placed: Bool, open_sides: Bool) -> list[Finding]:
-    """Report motion that does not tell a layout from its rotations and its mirror image."""
+def _flat_motion(log: Log, estimate: TeamEstimate, placed: Bool) -> list[Finding]:
+    """Report a path near a line or plane, if only one node has an IMU and others are static."""
     constellation, d = log.constellation, log.constellation.dimensions
-    inertial = np.isin(log.block.kind[0], (Kind.IMU, Kind.STATE)) & log.block.valid[0]
-    moving = np.unique(log.block.i[0, inertial])
-    if not len(moving):
-        return []  # `no-imu` says it
+    moving, static = _with_imu(log), np.flatnonzero(constellation.is_static)
+    if len(moving) != 1 or not len(static):
+        return []
+    path = estimate.between(int(static[0]), int(moving[0]))[0][placed, :d]
+    least, most = _extent(path)
+    if least > FLAT * most:
+        return []
     ids = tuple(constellation.ids[n] for n in moving)
-    head = f"for {open_sides.mean():.0%} of the time pairs are ambiguous: "
-    static = np.flatnonzero(constellation.is_static)
-    if len(moving) == 1 and len(static):
-        path = estimate.between(int(static[0]), int(moving[0]))[0][placed, :d]
-        least, most = _extent(path)
-        if least <= FLAT * most:
-            text = (
-                f"the path of {names(ids)} stays near {_shape(d)} ({least:.2f} m across, "
-                f"{most:.2f} m along, standard deviations), so the static nodes and their mirror "
-                "image across it fit almost equally well"
-            )
-            return [Finding("degenerate-motion", ids, head + text)]
-    text = f"the motion of {names(ids)} did not tell the layout from its rotations and mirror image"
-    return [Finding("undecided-layout", ids, head + text)]
+    text = (
+        f"the path of {names(ids)} stays near {_shape(d)} ({least:.2f} m across, {most:.2f} m "
+        "along, standard deviations), so the static nodes and their mirror image across it fit "
+        "almost equally well: what is ok may be the mirror image"
+    )
+    return [Finding("degenerate-motion", ids, text)]
+
+
+def _undecided(log: Log, open_sides: Bool) -> list[Finding]:
+    """Report motion that does not tell a layout from its rotations and its mirror image."""
+    ids = tuple(log.constellation.ids[n] for n in _with_imu(log))
+    if not ids:
+        return []  # `no-imu` says it
+    text = (
+        f"for {open_sides.mean():.0%} of the time pairs are ambiguous: the motion of {names(ids)} "
+        "did not tell the layout from its rotations and mirror image"
+    )
+    return [Finding("undecided-layout", ids, text)]
+
+
+def _with_imu(log: Log) -> I64:
+    """Return the nodes with inertial samples."""
+    inertial = np.isin(log.block.kind[0], (Kind.IMU, Kind.STATE)) & log.block.valid[0]
+    return np.unique(log.block.i[0, inertial])
 
 
 def _extent(path: F64) -> tuple[float, float]:

@@ -33,6 +33,10 @@ TILTED, OVERTURNED = np.radians(8.0), np.radians(45.0)
 MOST_BIAS = 0.035
 """[rad/s] Largest steady rate that is estimated as a bias (`RestParams.largest_bias`)."""
 
+FASTEST = 35.0
+"""[rad/s] Full scale of gyroscopes, 2000 deg/s."""
+MOST_FASTEST = 0.02
+"""[-] Largest share of readings beyond it, such as single wrong ones."""
 LARGEST_BIAS = 0.2
 """[rad/s] Largest bias; a gyroscope beyond is broken, or in other units."""
 MOST_AT_REST = 0.9
@@ -117,6 +121,13 @@ def find_in_samples(node: NodeConfig, t: F64, values: F64) -> list[Finding]:
     """
     if len(t) < 4 * FEWEST or t[-1] - t[0] < 2.0 * WINDOW:
         return []
+    is_fast = np.abs(values[:, :3]).max(axis=1) > FASTEST
+    if is_fast.mean() > MOST_FASTEST:
+        text = (
+            f"node {node.id}: {is_fast.mean():.0%} of gyr_x, gyr_y, gyr_z are beyond "
+            f"{FASTEST:.0f} rad/s (2000 deg/s), expected rad/s; they may be in deg/s"
+        )
+        return [Finding("gyro-units", (node.id,), text)]
     rest, found = rest_of(t, values), list[Finding]()
     if not rest.seconds:
         text = f"node {node.id} never rests: the bias of its gyroscope is not known at first"

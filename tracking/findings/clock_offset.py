@@ -24,9 +24,10 @@ from tracking.log.folder import Log
 from tracking.measurements import Kind
 
 NEAR = np.array([-0.2, -0.1, 0.0, 0.1, 0.2])
-"""[s] Trial offsets of all nodes together, and of each node."""
+"""[s] Trial offsets of each node."""
 ALL = np.concatenate([-np.arange(0.4, 4.1, 0.4)[::-1], NEAR, np.arange(0.4, 4.1, 0.4)])
-"""[s] Trial offsets if ranges are likeliest at the ends of `NEAR`, or an IMU is suspected."""
+"""[s] Trial offsets of all nodes together, and of each node if ranges are likeliest at the ends of
+`NEAR` or an IMU is suspected."""
 LEAST_GAIN = 0.01
 """[-] Least gain in log-likelihood of a range; a right clock seems to gain up to 0.007."""
 NEGLIGIBLE = 0.04
@@ -56,17 +57,17 @@ def correct_clocks(
     Returns:
         The log with the corrections, and the findings.
     """
-    carriers = np.unique(log.block.i[0, log.block.kind[0] == Kind.IMU]).tolist()
-    if not carriers or log.constellation.n_nodes < 3:
+    with_imu = carriers(log)
+    if not with_imu or log.constellation.n_nodes < 3:
         return log, []
-    alone = carriers if len(carriers) <= MOST_NODES else list(suspects)
-    groups = [tuple(carriers)] + [(n,) for n in alone if len(carriers) > 1]
+    alone = with_imu if len(with_imu) <= MOST_NODES else list(suspects)
+    groups = [tuple(with_imu)] + [(n,) for n in alone if len(with_imu) > 1]
     found = list[Finding]()
     while groups:
         tried = list[Explained | None]()
         for nodes in through(groups, len(found), progress):
             found_here = _offset(log, nodes, suspects)
-            is_alone = len(nodes) == 1 and nodes[0] not in suspects and len(carriers) > 1
+            is_alone = len(nodes) == 1 and nodes[0] not in suspects and len(with_imu) > 1
             if found_here is not None and is_alone and _drifts(found_here):
                 found_here = None
             tried.append(found_here)
@@ -85,15 +86,22 @@ def correct_clocks(
     return log, found
 
 
+def carriers(log: Log) -> list[int]:
+    """Return the nodes with an IMU."""
+    return [int(n) for n in np.unique(log.block.i[0, log.block.kind[0] == Kind.IMU])]
+
+
 def _offset(log: Log, nodes: tuple[int, ...], suspects: dict[int, F64]) -> Explained | None:
     """Estimate the delay of the stamps of some nodes [s]; `suspects` as in `correct_clocks`."""
-    block, is_far = beginning(log), bool(suspects)
+    block = beginning(log)
     own, than = of_nodes(block, nodes), list(suspects.values())[-1] if suspects else None
 
     def cost(late: float) -> F64:
         return misfit(log, moved_in_time(block, -late, own)).surprise
 
     most = most_surprise(log)
+    # Far from the right clock likelihoods have no slope towards it, but local optima.
+    is_far = bool(suspects) or len(nodes) == len(carriers(log))
     found = best(cost, ALL if is_far else NEAR, LEAST_GAIN, most, than)
     if found is not None and not found.is_within and not is_far:
         found = best(cost, ALL, LEAST_GAIN, most, than)

@@ -114,8 +114,13 @@ KINDS: dict[str, Kind] = {
     ),
     "truth-clock": Kind(
         "warning",
-        "the truth has no time in common with the measurements, so nothing is scored",
+        "the truth is on another clock than the ranges, so errors are wrong, or nothing is scored",
         "stamp both on one clock",
+    ),
+    "truth-nodes": Kind(
+        "warning",
+        "ranges fit better if the truth of two nodes is exchanged",
+        "correct the ids in truth.csv",
     ),
     "ranges-refused": Kind(
         "warning",
@@ -128,7 +133,7 @@ KINDS: dict[str, Kind] = {
         "place a node off the line, or drive until the group leaves it",
     ),
     "degenerate-motion": Kind(
-        "note",
+        "warning",
         "a node that moves along a line (in space: in a plane) fits two mirror images of the rest",
         "move it off that line or plane too: up and down for seconds, if it is a plane",
     ),

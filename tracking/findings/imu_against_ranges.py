@@ -36,6 +36,7 @@ AXES = {
 """Trial columns x and y, with signs, of a sensor whose horizontal axes are wrong."""
 SENSORS = {"accelerometer": (Kind.IMU, 3), "magnetometer": (Kind.MAG, 0)}
 """Sensors whose axes are tried, with their kind of event and first column."""
+RADIANS = np.pi / 180.0
 
 
 def find_suspects(log: Log, progress: Progress) -> dict[int, F64]:
@@ -62,11 +63,14 @@ def find_suspects(log: Log, progress: Progress) -> dict[int, F64]:
 
 
 def find_wrong_axes(log: Log, suspects: Sequence[int], progress: Progress) -> list[Finding]:
-    """Find axes that explain IMUs which contradict the ranges."""
+    """Find axes, or rates in deg/s, that explain IMUs which contradict the ranges."""
     block, found = beginning(log), list[Finding]()
     for n in through(suspects, 0, progress):
         bare = without(block, n)
         least, named = misfit(log, bare).surprise, ""
+        cost = misfit(log, _in_radians(block, n)).surprise
+        if (cost < least).all():
+            least, named = cost, "its gyroscope were in deg/s"
         for sensor, (kind, column) in SENSORS.items():
             for axes, (order, signs) in AXES.items():
                 turned = _turned(block, n, kind, column, order, signs)
@@ -85,6 +89,12 @@ def find_wrong_axes(log: Log, suspects: Sequence[int], progress: Progress) -> li
 def without(block: MeasurementBlock, n: int) -> MeasurementBlock:
     """Return a block without the IMU and magnetometer of node n."""
     return block.take(~of_nodes(block, (n,)))
+
+
+def _in_radians(block: MeasurementBlock, n: int) -> MeasurementBlock:
+    values = block.values.copy()
+    values[0, (block.kind[0] == Kind.IMU) & (block.i[0] == n), :3] *= RADIANS
+    return replace(block, values=values)
 
 
 def _turned(

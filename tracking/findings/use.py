@@ -23,7 +23,6 @@ def find_unused(log: Log) -> list[Finding]:
     block, constellation, found = log.block, log.constellation, list[Finding]()
     kind, node = block.kind[0], block.i[0]
     with_imu = np.unique(node[kind == Kind.IMU])
-    found += find_truth_outside(log)
     if log.unused_keys:
         text = f"meta.toml: {', '.join(log.unused_keys)} not read, expected a key of the log format"
         found.append(Finding("unused-keys", (), text))
@@ -72,19 +71,6 @@ def find_without_imu(log: Log) -> list[Finding]:
         )
         found.append(Finding("no-imu", (node,), text))
     return found
-
-
-def find_truth_outside(log: Log) -> list[Finding]:
-    """Find a truth of moving nodes that has no time in common with the measurements."""
-    truth, t = log.truth, log.block.t[0]
-    times = truth.t[truth.valid & ~log.constellation.is_static[truth.node]]
-    if not len(times) or not len(t) or (times.min() <= t.max() and times.max() >= t.min()):
-        return []
-    text = (
-        f"truth is from {times.min():.1f} to {times.max():.1f} s, measurements are from "
-        f"{t.min():.1f} to {t.max():.1f} s: no time in common, so nothing is scored"
-    )
-    return [Finding("truth-clock", (), text)]
 
 
 def find_in_estimates(log: Log, estimate: TeamEstimate, n_refused: int) -> list[Finding]:

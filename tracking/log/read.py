@@ -20,11 +20,10 @@ from tracking.log.meta import read_meta
 from tracking.log.table import Table, find_table
 from tracking.log.truth import Truth
 from tracking.measurements import Kind, MeasurementBlock
+from tracking.sanity.measurements import FARTHEST
 
-MAX_DISTANCE = 300.0
-"""[m] Beyond the range of any UWB radio."""
-MAX_GYR = 80.0
-"""[rad/s] Beyond any gyroscope's range (2000 deg/s is 35)."""
+MAX_GYR = 4000.0
+"""[rad/s] Beyond any gyroscope's range, in deg/s too, which the finding `gyro-units` reports."""
 MAX_ACC = 700.0
 """[m/s2] Beyond the range of usual accelerometers (16 g is 157)."""
 MAX_POSITION = 1e5
@@ -92,8 +91,8 @@ def _read_ranges(
     distance, filled = table.numbers(("range_m",))
     d = distance[:, 0]
     with np.errstate(invalid="ignore"):
-        good = filled[:, 0] & np.isfinite(d) & (d > 0.0) & (d <= MAX_DISTANCE)
-    table.check_share(good, f"metres, above 0 and up to {MAX_DISTANCE:g}", ("range_m",))
+        good = filled[:, 0] & np.isfinite(d) & (d > 0.0) & (d <= FARTHEST)
+    table.check_share(good, f"metres, above 0 and up to {FARTHEST:g}", ("range_m",))
     skipped[path.name] = int(np.sum(~good))
     survey = np.zeros(table.n_rows, dtype=bool)
     if "source" in table:
