@@ -67,9 +67,20 @@ class TrackResult:
     realtime_factor: float
     """[-] Duration of the log divided by the run time of tracking."""
     bound: Bound | None = None
-    """Expected errors of an efficient estimator, if requested."""
+    """Expected errors of an efficient filter, which does not use later measurements, if
+    requested."""
+    smooth: Smoothing | None = None
+    """Smoothing, see `track_log`; None for a filter."""
     findings: tuple[Finding, ...] = ()
     """Problems of the recording and of its tracking."""
+
+    @property
+    def method(self) -> str:
+        """Filter and smoothing, such as "joint, smoothed"."""
+        return (
+            self.filter
+            + {None: "", "lag": ", smoothed with a lag", "all": ", smoothed"}[self.smooth]
+        )
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -83,6 +94,7 @@ class TrackResult:
         return {
             "log": self.log.name,
             "filter": self.filter,
+            "smooth": self.smooth,
             "nodes": constellation.n_nodes,
             "duration_s": self.log.duration,
             "ranges": self.log.n_ranges,
@@ -134,7 +146,7 @@ def track_log(
         skip: Time after the first range that is not scored [s].
         smooth: Fixed-lag smoothing over `LAG` ("lag"), or smoothing over the whole log ("all",
             `tracking.whole_smoother`); None for filtering.
-        bound: Expected errors of an efficient estimator, copied to the result
+        bound: Expected errors of an efficient filter, copied to the result
             (`tracking.metrics.bound.recorded_bound`).
         params: Parameters of the tracker.
         findings: Results of `tracking.findings.examine` for this log; an empty sequence uses the
@@ -190,6 +202,7 @@ def track_log(
         range_noise=None if noise is None else float(noise[0]),
         realtime_factor=log.duration / max(elapsed, 1e-9),
         bound=bound,
+        smooth=smooth,
         findings=found,
     )
 

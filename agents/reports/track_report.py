@@ -33,7 +33,8 @@ def track_report(results: Sequence[TrackResult]) -> str:
         "after the best rotation and reflection (rmse_mirror). ok: share of the scored time; "
         f"wrong: share of the run in which a pair was ok and off by more than {LIMIT:g} m and "
         f"{SIGMAS:g} of its own standard deviations. NEES and NIS are 1 where the covariance is "
-        "right. bound: expected errors of an efficient estimator, if the assumed noise is true."
+        "right. bound: expected errors of an efficient filter, if the assumed noise is true; a "
+        "smoother, which also uses later measurements, can be better."
     )
     header = [
         "log", "filter", "rmse", "rmse_yaw", "yaw deg", "rmse_shape", "rmse_mirror", "ok",
@@ -47,7 +48,7 @@ def track_report(results: Sequence[TrackResult]) -> str:
         others += [percent(s["ok_share"]), percent(s["integrity_share"], 2)]
         others += [metres(s[k]) for k in ("nees", "nis")]
         yaw = "-" if s["yaw_deg"] is None else f"{s['yaw_deg']:.1f}"
-        rows.append([s["log"], s["filter"], *figures, yaw, *others])
+        rows.append([s["log"], r.method, *figures, yaw, *others])
         if r.expected:
             world, turned, shape, _ = (metres(r.expected.get(name)) for name in ERRORS)
             rows.append(["", "bound", world, turned, "", shape, *[""] * 5])
@@ -59,7 +60,7 @@ def track_report(results: Sequence[TrackResult]) -> str:
 
 def _add_result(page: Page, r: TrackResult) -> None:
     log = r.log
-    page.heading(f"{log.name}, {r.filter}")
+    page.heading(f"{log.name}, {r.method}")
     page.text(
         f"{log.constellation.n_nodes} nodes, {log.duration:.0f} s, {log.n_ranges} ranges, of "
         f"which {r.n_rejected} were refused as outliers; {sum(log.skipped.values())} bad rows "
@@ -81,9 +82,11 @@ def _add_result(page: Page, r: TrackResult) -> None:
     if not pairs:
         page.text("No pair has a moving node, so there is nothing to draw.")
         return
+    n_left_out = int(_is_moving(r).sum()) - len(pairs)
+    more = f" The first {len(pairs)} pairs; {n_left_out} more are not drawn." if n_left_out else ""
     page.figure(
         _trajectories(r, pairs),
-        "Relative trajectories from above, seen from node i, after one constant yaw.",
+        f"Relative trajectories from above, seen from node i, after one constant yaw.{more}",
     )
     page.figure(
         _errors(r, pairs),
@@ -94,9 +97,12 @@ def _add_result(page: Page, r: TrackResult) -> None:
 
 
 def _pairs_to_draw(r: TrackResult) -> list[int]:
+    return [int(p) for p in np.nonzero(_is_moving(r))[0][:MAX_PAIRS]]
+
+
+def _is_moving(r: TrackResult) -> np.ndarray:
     constellation = r.log.constellation
-    moving = ~constellation.is_static[constellation.pairs].all(axis=1)
-    return [int(p) for p in np.nonzero(moving)[0][:MAX_PAIRS]]
+    return np.asarray(~constellation.is_static[constellation.pairs].all(axis=1))
 
 
 def _known(r: TrackResult, p: int) -> np.ndarray:

@@ -13,7 +13,9 @@ from tracking.measurements import Kind
 MOST_AMBIGUOUS = 0.5
 """[-] Share of the time that may be ambiguous without a reason being looked for."""
 FLAT = 0.1
-"""[-] Extent across over that along, below which nodes or a path are near a line or a plane."""
+"""[-] Extent across over that along, below which nodes are near a line or a plane."""
+FLAT_PATH = 0.2
+"""[-] The same for a path; paths that told both images apart have 0.4."""
 LARGEST_STEP = 0.3
 """[m] Largest step of a path; a larger one is a change between images of the layout."""
 
@@ -66,7 +68,7 @@ def _flat_motion(log: Log, estimate: TeamEstimate, placed: Bool) -> list[Finding
         return []
     path = estimate.between(int(static[0]), int(moving[0]))[0][placed, :d]
     least, most = _extent(path)
-    if least > FLAT * most:
+    if least > FLAT_PATH * most:
         return []
     ids = tuple(constellation.ids[n] for n in moving)
     text = (

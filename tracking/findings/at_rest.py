@@ -101,13 +101,17 @@ def correct_at_rest(log: Log) -> tuple[Log, list[Finding]]:
     for n, node in enumerate(log.constellation.nodes):
         rows = np.flatnonzero((block.kind[0] == Kind.IMU) & (block.i[0] == n) & block.valid[0])
         of_node = find_in_samples(node, block.t[0, rows], block.values[0, rows, :6])
-        if any(f.name == "gyro-bias" for f in of_node):
-            rest = rest_of(block.t[0, rows], block.values[0, rows, :6])
-            if is_bias(rest, float(np.ptp(block.t[0, rows]))):
-                values = block.values.copy()
-                values[0, rows, :3] -= rest.rate
-                block = replace(block, values=values)
-        found += of_node
+        for f in of_node:
+            said = ""
+            if f.name == "gyro-bias":
+                rest = rest_of(block.t[0, rows], block.values[0, rows, :6])
+                said = "; kept, as it may be a rotation"
+                if is_bias(rest, float(np.ptp(block.t[0, rows]))):
+                    said = "; subtracted"
+                    values = block.values.copy()
+                    values[0, rows, :3] -= rest.rate
+                    block = replace(block, values=values)
+            found.append(replace(f, text=f.text + said))
     return (log if block is log.block else replace(log, block=block)), found
 
 

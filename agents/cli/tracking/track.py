@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 @click.option(
     "--bound",
     is_flag=True,
-    help="Also show the expected errors of an efficient estimator; needs truth.",
+    help="Also show the expected errors of an efficient filter; needs truth.",
 )
 @click.option(
     "--accuracy",
@@ -203,10 +203,16 @@ def print_tracks(results: Sequence[Any]) -> None:
     rows = []
     for r in results:
         s = r.summary
-        head = [f"{s['log']}  {s['filter']}", "all"]
+        head = [f"{s['log']}  {r.method}", "all"]
         rows.append([*head, *(metres(s[k]) for k in ERRORS)])
         if r.expected:
-            rows.append(["", "bound", *(metres(r.expected.get(k)) for k in ERRORS)])
+            rows.append(
+                [
+                    "",
+                    "bound of a filter" if r.smooth else "bound",
+                    *(metres(r.expected.get(k)) for k in ERRORS),
+                ]
+            )
         pairs = [p for p, e in enumerate(r.score.pair_rmse) if e == e]
         for p in pairs:
             figures = (r.score.pair_rmse, r.score.pair_rmse_yaw, r.score.pair_rmse_shape)
@@ -217,7 +223,7 @@ def print_tracks(results: Sequence[Any]) -> None:
     for r in results:
         skipped = ", ".join(f"{n} in {name}" for name, n in r.log.skipped.items()) or "0"
         click.echo(
-            f"{r.log.name}, {r.filter}: {r.log.n_ranges} ranges in {r.log.duration:.0f} s, "
+            f"{r.log.name}, {r.method}: {r.log.n_ranges} ranges in {r.log.duration:.0f} s, "
             f"{r.n_rejected} refused as outliers, bad rows skipped: {skipped}, "
             f"status ok {percent(r.score.ok_share)} of the scored time, ok and wrong "
             f"{percent(r.score.integrity_share, 2)} of the run{_longest(r.score)}, "
