@@ -15,7 +15,7 @@ MOST_AMBIGUOUS = 0.5
 FLAT = 0.1
 """[-] Extent across over that along, below which nodes are near a line or a plane."""
 FLAT_PATH = 0.2
-"""[-] The same for a path; paths that told both images apart have 0.4."""
+"""[-] The same for a path; paths that distinguish both images have 0.4."""
 LARGEST_STEP = 0.3
 """[m] Largest step of a path; a larger one is a change between images of the layout."""
 
