@@ -99,8 +99,7 @@ class TrainConfig:
     """A training run."""
 
     frames: int = number(6_000_000, 1000, 1000000000000)
-    """Agent steps of a run, those of absent cars included, rounded up to whole evaluation
-    intervals."""
+    """Agent steps of a run, those of absent cars included, rounded up to whole updates."""
     runs: int = number(1, 1, 64)
     """Number of parallel runs, with seeds from `seed` on, each in its own process; the best policy
     of all runs is kept."""

@@ -120,6 +120,8 @@ def run_interval(
 def learn(model: PPO, config: TrainConfig, tell: Callable[[int], None] | None = None) -> None:
     """Train for one evaluation interval without resetting the episodes; see `run_interval`."""
     frames = config.eval_interval * config.ppo.steps * model.n_envs
+    # The last interval ends with the run, after whole updates.
+    frames = min(frames, max(config.frames - model.num_timesteps, 1))
     callbacks: list[BaseCallback] = [_Threads(config.threads), _Noise(config)]
     if tell is not None:
         callbacks.append(_Tells(tell))
