@@ -5,10 +5,12 @@ from __future__ import annotations
 from functools import partial
 
 from relpos_env.errors import EnvError
-from tracking.params.registry import look_up as find
+from tracking.params import registry
 
-look_up = partial(find, raises=EnvError)
+look_up = partial(registry.look_up, raises=EnvError)
 """`tracking.params.registry.look_up`; its errors are `EnvError`."""
+build = partial(registry.build, raises=EnvError)
+"""`tracking.params.registry.build`; its errors are `EnvError`."""
 
 
 def name_of(thing: object) -> str:

@@ -63,6 +63,7 @@ for commands in SECTIONS.values():
 
 def main() -> None:
     """Run the command line; user errors end with a one-line message and status 2."""
+    sys.path.append("")  # `package.module:Name` of the current folder, after what is installed
     try:
         cli(standalone_mode=False)
     except click.exceptions.Abort:

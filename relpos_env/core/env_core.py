@@ -24,7 +24,7 @@ from relpos_env.interface.observations.base import F32
 from relpos_env.interface.views import reveal
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.sensors.operator import Operator
-from relpos_env.tasks import reward_weights
+from relpos_env.tasks import TASKS, reward_weights
 from relpos_env.timing import DECISION, DT, STAND_STILL
 from relpos_env.world.world import Physics, World
 from relpos_env.world.world_state import WorldState
@@ -76,6 +76,7 @@ class EnvCore:
         )
         self.task = parts.make_task(n_envs)
         self.operator = Operator(config.operator, n, n_envs)
+        self._is_own_task = not (isinstance(config.task, str) and config.task in TASKS)
         self.weights = reward_weights(config.task, self.task, config.weights)
         self._size = total_size(parts.mode.fields)
         self.observations: F32 = np.zeros((n_envs, n, config.history * self._size), np.float32)
@@ -227,6 +228,19 @@ class EnvCore:
             self._judge_all()
         else:
             judge(envs.start, envs.stop, *self._verdict)
+        if self._is_own_task:
+            self._check_task_rewards()
+
+    def _check_task_rewards(self) -> None:
+        """Check the rewards of a task from outside the package.
+
+        Raises:
+            EnvError: A reward term is not a finite number.
+        """
+        finite = np.isfinite(self.task.rewards).all(axis=(0, 1))
+        if not finite.all():
+            term = self.task.terms[int(np.argmin(finite))]
+            raise EnvError(f"task {self.parts.config.task!r}, reward {term!r}: expected numbers")
 
     def _add_own_reward(self, term: RewardTerm) -> None:
         """Add the user's term to the rewards of the cars in the room.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from gymnasium import spaces
 
 from relpos_env.errors import EnvError
-from relpos_env.registry import look_up
+from relpos_env.registry import build, look_up
 from tracking.arrays import F64
 from tracking.params.short_repr import short_repr
 
@@ -34,6 +34,7 @@ class DriveCommand:
     """Commanded steering angle [rad]; positive turns left."""
 
 
+@runtime_checkable
 class ActionMode(Protocol):
     """Mapping of actions to drive commands."""
 
@@ -124,4 +125,6 @@ def action_mode(name: str | Callable[[], ActionMode]) -> ActionMode:
     Raises:
         EnvError: There is no action mode of this name.
     """
-    return look_up(ACTIONS, name, "actions", group="relpos_env.actions")()
+    builder = look_up(ACTIONS, name, "actions", group="relpos_env.actions")
+    expected = "actions: expected a function () that returns an ActionMode"
+    return build(builder, name, (), ActionMode, expected)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from relpos_env.errors import EnvError
-from relpos_env.registry import look_up
+from relpos_env.registry import build, look_up
 from relpos_env.tasks.base import Task, Truth
 from relpos_env.tasks.follow import follow
 from relpos_env.tasks.gap import Gap
@@ -59,14 +59,15 @@ def make_task(
     Raises:
         EnvError: Unknown task, unknown option, or an option out of range.
     """
-    build = task_builder(name)
-    known = [p for p in inspect.signature(build).parameters if p not in _ALWAYS]
+    builder = task_builder(name)
+    known = [p for p in inspect.signature(builder).parameters if p not in _ALWAYS]
     for option in options:
         if option not in known:
             raise EnvError(f"{option}: task {name!r} expected options among {', '.join(known)}")
-    return build(n_cars, n_envs, room, **options)
+    return build(builder, name, (n_cars, n_envs, room), Task, _EXPECTED, options=options)
 
 
+_EXPECTED = "task: expected a function (n_cars, n_envs, room, **options) that returns a Task"
 _ALWAYS = ("n_cars", "n_envs", "room")
 
 __all__ = [

@@ -48,6 +48,12 @@ def reward_weights(name: object, task: Task, override: Mapping[str, float] | Non
         EnvError: Unknown term, or a weight that is not finite.
     """
     ours = DEFAULT_WEIGHTS.get(name) if isinstance(name, str) else None
+    for term in () if ours else task.default_weights:
+        if term not in task.terms:
+            raise EnvError(
+                f"default_weights of {type(task).__name__}: expected terms among "
+                f"{', '.join(task.terms)}, got {term!r}"
+            )
     chosen = {**dict.fromkeys(task.terms, 1.0), **(ours or task.default_weights)}
     for term, weight in (override or {}).items():
         if term not in task.terms:

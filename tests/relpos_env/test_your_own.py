@@ -125,6 +125,42 @@ def test_what_is_no_filter_is_refused_before_it_runs():
         Tracker(who, n_envs=0)
 
 
+class Weighted(Rendezvous):
+    """A task with a weight of no term."""
+
+    default_weights = {"speed": 1.0}  # noqa: RUF012
+
+
+class Lost(Rendezvous):
+    """A task whose reward is no number."""
+
+    def compute(self, *given):
+        n_changed = super().compute(*given)
+        self.rewards[..., 1] = np.nan
+        return n_changed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"task": "os:system"}, r"task: expected a function \(n_cars, .* returns a Task, got"),
+        ({"task": lambda n_cars, n_envs, room: 3}, "returns a Task, got .*, which returns int"),
+        ({"observation": "os:system"}, "observation: expected a function .* ObservationMode, got"),
+        ({"observation": lambda *given: given}, "ObservationMode, got .*, which returns tuple"),
+        ({"actions": dict}, "actions: expected a function .* ActionMode, got .* returns dict"),
+        ({"task": Weighted}, "default_weights of Weighted: expected terms among .*, got 'speed'"),
+    ],
+)
+def test_parts_of_the_wrong_kind_are_named(arguments, message):
+    with pytest.raises(EnvError, match=message):
+        parallel_env(**arguments)
+
+
+def test_a_task_whose_reward_is_no_number_is_named():
+    with pytest.raises(EnvError, match=r"task .*Lost.*, reward 'progress': expected numbers"):
+        parallel_env(task=Lost).reset(seed=0)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -167,11 +203,14 @@ def test_entry_points_of_an_installed_package_are_names(tmp_path, monkeypatch):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: swarmland\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[relpos_env.controllers]\nsleepy = swarmland:sleepy\n")
     relpos = Path(sys.executable).with_name("relpos")
+    folder = tmp_path / "current"
+    folder.mkdir()
+    (folder / "here.py").write_text("from swarmland import sleepy\n")
     path = {"PYTHONPATH": str(tmp_path), "PATH": str(relpos.parent)}
     command = [
-        relpos, "compare", "sleepy", "swarmland:sleepy", "--episodes", "1", "--seconds", "3",
-        "--settle", "1", "--json",
+        relpos, "compare", "sleepy", "swarmland:sleepy", "here:sleepy", "--episodes", "1",
+        "--seconds", "3", "--settle", "1", "--json",
     ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, env=path, check=True)
-    assert '"sleepy"' in done.stdout
-    assert '"swarmland:sleepy"' in done.stdout
+    done = subprocess.run(command, capture_output=True, text=True, env=path, check=True, cwd=folder)
+    for name in ("sleepy", "swarmland:sleepy", "here:sleepy"):
+        assert f'"{name}"' in done.stdout

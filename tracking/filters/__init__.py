@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from inspect import signature
 
 from tracking.constellation import Constellation
-from tracking.errors import ConfigError
 from tracking.filters.base import Filter
 from tracking.filters.joint import JointEkf
 from tracking.filters.pair import PairEkf
 from tracking.filters.paper import PaperEkf
 from tracking.filters.params import FilterParams
-from tracking.params.registry import look_up
+from tracking.params.registry import build, look_up
 
 FilterBuilder = Callable[[Constellation, FilterParams, int], Filter]
 
@@ -69,18 +67,8 @@ def build_filter(
     Raises:
         ConfigError: No filter has that name, or it is something else than a filter.
     """
-    builder = filter_builder(name)
     expected = "filter: expected a function (constellation, params, n_envs) that returns a Filter"
-    try:
-        signature(builder).bind(constellation, params, n_envs)
-    except TypeError:
-        raise ConfigError(f"{expected}, got {name!r}") from None
-    except ValueError:
-        pass  # some functions of C have no signature
-    built = builder(constellation, params, n_envs)
-    if not isinstance(built, Filter):
-        raise ConfigError(f"{expected}, got {name!r}, which returns {type(built).__name__}")
-    return built
+    return build(filter_builder(name), name, (constellation, params, n_envs), Filter, expected)
 
 
 __all__ = [

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import entry_points
+from inspect import signature
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from tracking.errors import ConfigError
@@ -51,6 +53,43 @@ def look_up(
         raise raises(f"{argument}: cannot import {name!r}: {error}") from error
     others = f", {', '.join(sorted(found))}" if found else ""
     raise raises(f"{expected}{others} or package.module:Name, got {name!r}")
+
+
+def build(
+    builder: Callable[..., Entry],
+    name: object,
+    given: Sequence[Any],
+    kind: type,
+    expected: str,
+    *,
+    options: Mapping[str, Any] = MappingProxyType({}),
+    raises: type[Exception] = ConfigError,
+) -> Entry:
+    """Call an entry and check what it returns.
+
+    Args:
+        builder: Entry, as `look_up` returns it.
+        name: Name or object that `look_up` found it by, for the message.
+        given: Arguments of the call.
+        kind: Class of the result, or protocol that can be checked at run time.
+        expected: Argument and signature for the message, such as "task: expected a function
+            (...) that returns a Task".
+        options: Keyword arguments of the call.
+        raises: Class of the error.
+
+    Raises:
+        ConfigError: The entry does not take these arguments, or returns something else.
+    """
+    try:
+        signature(builder).bind(*given, **options)
+    except TypeError:
+        raise raises(f"{expected}, got {name!r}") from None
+    except ValueError:
+        pass  # some functions of C have no signature
+    built = builder(*given, **options)
+    if not isinstance(built, kind):
+        raise raises(f"{expected}, got {name!r}, which returns {type(built).__name__}")
+    return built
 
 
 def _import(name: str) -> Any:

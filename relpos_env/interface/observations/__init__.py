@@ -14,7 +14,7 @@ from relpos_env.interface.observations.base import (
 )
 from relpos_env.interface.observations.ranges import Ranges
 from relpos_env.interface.observations.relative import RelativePositions
-from relpos_env.registry import look_up
+from relpos_env.registry import build, look_up
 
 ModeBuilder = Callable[[int, int], ObservationMode]
 
@@ -39,8 +39,9 @@ def observation_mode(name: str | ModeBuilder, n_cars: int, proximity: int = 0) -
     Raises:
         EnvError: There is no mode of this name.
     """
-    build = look_up(OBSERVATIONS, name, "observation", group="relpos_env.observations")
-    return build(n_cars, proximity)
+    builder = look_up(OBSERVATIONS, name, "observation", group="relpos_env.observations")
+    expected = "observation: expected a function (n_cars, n_sensors) that returns an"
+    return build(builder, name, (n_cars, proximity), ObservationMode, f"{expected} ObservationMode")
 
 
 __all__ = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from gymnasium import spaces
@@ -31,6 +31,7 @@ class Field:
     """True if the field consists of equal parts, one per other car in order."""
 
 
+@runtime_checkable
 class ObservationMode(Protocol):
     """Mapping of a view to one vector per car, with the other cars in the order of their index.
 
