@@ -19,6 +19,8 @@ extensions = [
 ]
 html_theme = "furo"
 html_title = f"relpos-env {release}"
+html_static_path = ["static"]
+html_css_files = ["wide.css"]
 templates_path: list[str] = []
 exclude_patterns = ["images"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]

@@ -6,6 +6,7 @@ occurrences; `python tests/words.py --lower` lowers the limits to the present nu
 
 from __future__ import annotations
 
+import argparse
 import re
 import subprocess
 import sys
@@ -42,6 +43,9 @@ def count(word: str, found: dict[str, str]) -> list[str]:
 
 def main() -> int:
     """Compare with the limits; return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--lower", action="store_true", help="Lower the limits to what is found.")
+    lower = parser.parse_args().lower
     limits = tomllib.loads(FILE.read_text(encoding="utf-8"))
     found, failed, lines = texts(), False, []
     for word, entry in limits.items():
@@ -54,7 +58,7 @@ def main() -> int:
         lines.append(
             f'"{word}" = {{ use = "{entry["use"]}", most = {most} }}'.replace("\\", "\\\\")
         )
-    if "--lower" in sys.argv:
+    if lower:
         FILE.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return int(failed)
 

@@ -29,7 +29,7 @@ class Bag:
             from rosbags.typesys import Stores, get_typestore
         except ImportError as error:
             raise UsageError(
-                "rosbags is not installed: pip install 'relpos-env[convert]'"
+                "rosbags is not installed: pip install -e '.[convert]' in its source folder"
             ) from error
         store = get_typestore(Stores.ROS2_HUMBLE) if path.is_dir() else None
         self._by_receipt = time == "receipt"

@@ -206,7 +206,8 @@ def import_ray() -> Any:
         import ray
         import ray.exceptions
     except ImportError as error:
-        raise UsageError("--engine ray: needs ray: pip install 'relpos-env[ray]'") from error
+        text = "--engine ray: needs ray: pip install -e '.[ray]' in its source folder"
+        raise UsageError(text) from error
     return ray
 
 

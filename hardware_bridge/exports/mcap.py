@@ -50,7 +50,7 @@ def export_mcap(
     except ImportError as error:
         raise BridgeError(
             "MCAP needs the libraries mcap and mcap-ros2-support: "
-            "pip install 'relpos-env[hardware]'"
+            "pip install -e '.[hardware]' in its source folder"
         ) from error
     if block.n_envs != 1:
         raise BridgeError(f"block: expected one environment, got {block.n_envs}")

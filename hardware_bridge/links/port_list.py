@@ -41,7 +41,7 @@ def list_serial_ports() -> list[SerialPortInfo]:
         from serial.tools.list_ports import comports
     except ImportError as error:
         raise BridgeError(
-            "serial ports need pyserial: pip install 'relpos-env[hardware]'"
+            "serial ports need pyserial: pip install -e '.[hardware]' in its source folder"
         ) from error
 
     try:

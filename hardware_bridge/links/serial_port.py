@@ -106,7 +106,8 @@ def _opened(spec: PortSpec, path: str) -> serial.Serial:
         import serial
     except ImportError as error:
         raise BridgeError(
-            f"{spec.name}: serial ports need pyserial: pip install 'relpos-env[hardware]'"
+            f"{spec.name}: serial ports need pyserial: "
+            "pip install -e '.[hardware]' in its source folder"
         ) from error
     if spec.baud < 50:
         # A rate of 0 hangs up the line.

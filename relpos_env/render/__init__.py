@@ -2,7 +2,7 @@
 
     Snapshot -> Renderer.draw -> (height, width, 3) uint8, or a window
 
-Needs pygame, which is imported by the first `Renderer`: ``pip install relpos-env[render]``.
+Needs pygame, which is imported by the first `Renderer`: ``pip install -e '.[render]'``.
 """
 
 from relpos_env.render.renderer import RENDER_MODES, Renderer, save_snapshot

@@ -19,4 +19,5 @@ def load_pygame() -> ModuleType:
     try:
         return importlib.import_module("pygame")
     except ImportError as error:
-        raise EnvError("drawing needs pygame: pip install relpos-env[render]") from error
+        text = "drawing needs pygame: pip install -e '.[render]' in its source folder"
+        raise EnvError(text) from error

@@ -11,7 +11,7 @@ from agents.errors import UsageError
 from agents.jobs import find_engine
 from agents.jobs.ray_engine import start_ray
 
-pytest.importorskip("ray", reason="ray is not installed: pip install 'relpos-env[ray]'")
+pytest.importorskip("ray", reason="ray is not installed: pip install -e '.[ray]'")
 
 # Ray leaves its sockets to the garbage collector.
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")

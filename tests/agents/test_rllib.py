@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-pytest.importorskip("ray", reason="ray is not installed: pip install 'relpos-env[rllib]'")
-pytest.importorskip("tree", reason="RLlib is not installed: pip install 'relpos-env[rllib]'")
-pytest.importorskip("torch", reason="torch is not installed: pip install 'relpos-env[rllib]'")
+pytest.importorskip("ray", reason="ray is not installed: pip install -e '.[rllib]'")
+pytest.importorskip("tree", reason="RLlib is not installed: pip install -e '.[rllib]'")
+pytest.importorskip("torch", reason="torch is not installed: pip install -e '.[rllib]'")
 
 import torch
 from ray.rllib.core.columns import Columns

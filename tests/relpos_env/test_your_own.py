@@ -1,5 +1,6 @@
 """Tasks, observations, actions, rewards, controllers and filters from outside the package."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -58,6 +59,16 @@ def sleepy(fields):
 def slow_filter(constellation, params, n_envs):
     """A user's filter."""
     return FILTERS["ekf"](constellation, params, n_envs)
+
+
+def test_the_task_of_the_documentation_runs():
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "adding.md"
+    codes = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    (code,) = [code for code in codes if "class Spread(Task)" in code]
+    names = {}
+    exec(code, names)
+    assert names["env"].formation.task.terms == ("spread",)
+    assert all(np.isfinite(reward) for reward in names["rewards"].values())
 
 
 @pytest.mark.parametrize("named", [False, True])

@@ -110,7 +110,9 @@ def bench_train(updates: int, threads: int, after: int, as_json: bool) -> None:
     try:
         from agents.bench.train import bench_train as run
     except ImportError as error:
-        raise UsageError(f"training needs {error.name}: pip install 'relpos-env[train]'") from error
+        raise UsageError(
+            f"training needs {error.name}: pip install -e '.[train]' in its source folder"
+        ) from error
     with progress_bar("training") as report:
         rows = run(updates=updates, threads=threads, after=after, progress=report)
     _show_bench("Frames per second of training", rows, as_json)

@@ -39,7 +39,7 @@ def export(
         from agents.training.export import export_policy, read_results
     except ImportError as error:
         raise UsageError(
-            f"exporting needs {error.name}: pip install 'relpos-env[train]'"
+            f"exporting needs {error.name}: pip install -e '.[train]' in its source folder"
         ) from error
     names = {run.resolve().name, name or run.resolve().name}
     measured = read_results(results, names) if results is not None else []

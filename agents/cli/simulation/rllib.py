@@ -60,7 +60,7 @@ def rllib(
     missing = [name for name in ("ray", "tree", "torch", "onnx") if find_spec(name) is None]
     if missing:
         raise UsageError(
-            f"relpos rllib: needs {', '.join(missing)}: pip install 'relpos-env[rllib]', in an "
+            f"relpos rllib: needs {', '.join(missing)}: pip install -e '.[rllib]', in an "
             "environment of its own"
         )
     from agents.rllib.config import RllibConfig

@@ -42,7 +42,9 @@ def train(out: Path | None, resume: Path | None, as_json: bool, **given: Any) ->
         from agents.warm_up import warm_up_first
         from tracking.filters import DEFAULT_FILTER
     except ImportError as error:
-        raise UsageError(f"training needs {error.name}: pip install 'relpos-env[train]'") from error
+        raise UsageError(
+            f"training needs {error.name}: pip install -e '.[train]' in its source folder"
+        ) from error
     warm_up_first([DEFAULT_FILTER], purpose="env", in_space=False)
     with progress_bar(f"training {folder.name}") as tell:
 

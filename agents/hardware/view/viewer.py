@@ -110,7 +110,9 @@ def open_viewer(name: str, file: Path | None = None, *, browse: bool = True) -> 
     try:
         import rerun as rr
     except ImportError as error:
-        raise UsageError("--view: needs Rerun, pip install 'relpos-env[view]'") from error
+        raise UsageError(
+            "--view: needs Rerun, pip install -e '.[view]' in its source folder"
+        ) from error
     if file is not None:
         if file.suffix != ".rrd":
             raise UsageError(f"--view {file}: expected a name that ends in .rrd")
