@@ -134,7 +134,7 @@ def test_wrong_arguments_are_named(num_envs, kwargs, message):
         FormationTorchEnv(num_envs, **kwargs)
 
 
-@pytest.mark.filterwarnings("ignore:Creating VanillaWeightUpdater:DeprecationWarning")
+@pytest.mark.filterwarnings("ignore:Creating .*WeightUpdater:DeprecationWarning")
 def test_the_training_of_the_documentation_runs():
     page = Path(__file__).parents[2] / "docs" / "reference" / "environment.md"
     codes = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
