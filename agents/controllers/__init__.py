@@ -7,6 +7,7 @@ from collections.abc import Callable
 from agents.controllers.consensus import Consensus, ConsensusParams
 from agents.controllers.leader_follower import LeaderFollower, LeaderFollowerParams
 from agents.controllers.range_only import RangeOnly, RangeOnlyParams
+from agents.controllers.weaving import Weaving, WeavingParams
 from agents.driver import Driver
 from relpos_env.interface.observations import Field
 from relpos_env.registry import look_up
@@ -17,6 +18,7 @@ CONTROLLERS: dict[str, ControllerBuilder] = {
     "consensus": Consensus,
     "leader-follower": LeaderFollower,
     "range-only": RangeOnly,
+    "weaving": Weaving,
 }
 """Name to builder ``(observation fields) -> Driver``."""
 
@@ -42,5 +44,7 @@ __all__ = [
     "LeaderFollowerParams",
     "RangeOnly",
     "RangeOnlyParams",
+    "Weaving",
+    "WeavingParams",
     "controller_builder",
 ]

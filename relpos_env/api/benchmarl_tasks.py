@@ -97,6 +97,8 @@ class RelposTask(Task):  # type: ignore[misc]
     GAP = None
     RENDEZVOUS = None
     FOLLOW = None
+    OBSERVE = None
+    ESCORT = None
 
     @staticmethod
     def associated_class() -> type[RelposClass]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
@@ -75,7 +76,8 @@ class EnvCore:
             physics=physics,
         )
         self.task = parts.make_task(n_envs)
-        self.operator = Operator(config.operator, n, n_envs)
+        operator = replace(config.operator, gain=0.0) if self.task.drives else config.operator
+        self.operator = Operator(operator, n, n_envs)
         self._is_own_task = not (isinstance(config.task, str) and config.task in TASKS)
         self.weights = reward_weights(config.task, self.task, config.weights)
         self._size = total_size(parts.mode.fields)
@@ -146,6 +148,8 @@ class EnvCore:
         if options.goals is not None:
             cars = np.flatnonzero(self.state.present[env])
             self.task.set_goals(env, options.goals, cars)
+        if self.task.drives:
+            self.task.plan_drive(env, rng.spawn(1)[0])
         self.operator.reset(seed, here)
         self.cycles[env] = 0
         self.active[env] = False
@@ -164,6 +168,9 @@ class EnvCore:
         """
         if self.gate is not None:
             speed, steering = self.gate.allow(self.loop.view, speed, steering)
+        if self.task.drives:
+            speed, steering = speed.copy(), steering.copy()
+            self.task.drive(self.state, self.t, speed, steering)
         if self._pool is None:
             self.loop.step(speed, steering)
         else:
@@ -223,6 +230,8 @@ class EnvCore:
     def _judge(self, envs: slice) -> None:
         """Update task, operator and outcome with the current state."""
         self.task.update(self.state, self.t, self.loop.swarm.contacts, envs)
+        if self.task.reads_estimates:
+            self.task.inform(self.loop.view.cov, self.loop.view.ok, envs)
         self.operator.sample(self.state, self.task, envs)
         if envs.stop - envs.start == self.n_envs:
             self._judge_all()

@@ -9,9 +9,11 @@ from typing import Any
 from relpos_env.errors import EnvError
 from relpos_env.registry import build, look_up
 from relpos_env.tasks.base import Task, Truth
+from relpos_env.tasks.escort import Escort
 from relpos_env.tasks.follow import follow
 from relpos_env.tasks.gap import Gap
 from relpos_env.tasks.hold import hold
+from relpos_env.tasks.observe import observe
 from relpos_env.tasks.rendezvous import Rendezvous
 from relpos_env.tasks.ring import Ring
 from relpos_env.tasks.travel import travel
@@ -26,6 +28,8 @@ TASKS: dict[str, TaskBuilder] = {
     "gap": Gap,
     "rendezvous": Rendezvous,
     "follow": follow,
+    "observe": observe,
+    "escort": Escort,
 }
 """Name to builder ``(n_cars, n_envs, room, **options) -> Task``. A new task needs a file, a line
 here, and its weights in `DEFAULT_WEIGHTS`."""

@@ -48,6 +48,14 @@ class Truth(Protocol):
         """True while the car is in the room, (env, car)."""
 
 
+class Pose(Truth, Protocol):
+    """State of the world as read by tasks that drive a car."""
+
+    @property
+    def heading(self) -> F64:
+        """Heading, (env, car) [rad]."""
+
+
 class Task(ABC):
     """Targets, rewards and end of a batch of environments. Arrays are 0 for absent cars.
 
@@ -56,6 +64,11 @@ class Task(ABC):
 
     default_weights: Mapping[str, float] = MappingProxyType({})
     """Weights of reward terms that are not 1; those of built-in tasks are `DEFAULT_WEIGHTS`."""
+
+    drives: bool = False
+    """True if the task drives a car itself (`plan_drive`, `drive`), without an operator."""
+    reads_estimates: bool = False
+    """True if rewards depend on the estimates of the cars (`inform`)."""
 
     def __init__(self, n_cars: int, n_envs: int, terms: tuple[str, ...]) -> None:
         """Allocate the arrays.
@@ -143,6 +156,31 @@ class Task(ABC):
             EnvError: The task accepts no goals, or these are invalid.
         """
         raise EnvError("goals: expected none, the task has places of its own")
+
+    def plan_drive(self, env: int, rng: np.random.Generator) -> None:
+        """Draw the drive of an episode, for tasks that drive a car."""
+        raise NotImplementedError
+
+    def drive(self, state: Pose, t: F64, speed: F64, steering: F64) -> None:
+        """Replace the commands of the cars that the task drives.
+
+        Args:
+            state: True state of all environments.
+            t: Time since the start of the episode, (env) [s].
+            speed: Commanded speeds, (env, car) [m/s], updated.
+            steering: Commanded steering angles, (env, car) [rad], updated.
+        """
+        raise NotImplementedError
+
+    def inform(self, cov: F64, ok: Bool, envs: slice) -> None:
+        """Write the reward terms that depend on estimates, for tasks that read them.
+
+        Args:
+            cov: Covariances xx, yy, xy of relative positions, (env, car, other, 3) [m2].
+            ok: True for usable estimates, (env, car, other).
+            envs: Environments to update, contiguous.
+        """
+        raise NotImplementedError
 
     @abstractmethod
     def begin(self, env: int, pos: F64, cars: I64) -> None:

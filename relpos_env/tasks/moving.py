@@ -75,6 +75,7 @@ class MovingFormation(Task):
         *,
         led: bool = False,
         all_informed: bool = True,
+        more_terms: tuple[str, ...] = (),
     ) -> None:
         """Combine a formation and a motion.
 
@@ -85,6 +86,7 @@ class MovingFormation(Task):
             motion: Motion of the frame.
             led: True if the first present car has the first slot.
             all_informed: True if all cars receive the reference velocity; else only the first.
+            more_terms: Reward terms of a subclass, after the others.
         """
         self._placement, self._ways = motion.placement, None
         terms: tuple[str, ...]
@@ -94,7 +96,7 @@ class MovingFormation(Task):
         else:
             ends = motion.curve.length > 0.0 and not motion.curve.closed
             terms = ("formation", "velocity", *COMMON_TERMS, *(["time"] if ends else []))
-        super().__init__(n_cars, n_envs, terms)
+        super().__init__(n_cars, n_envs, (*terms, *more_terms))
         self._formation, self._motion = formation, motion
         self._led, self._all_informed = led, all_informed
         self._frame, self._places = np.zeros((n_envs, 4)), np.zeros((n_envs, n_cars, 3))

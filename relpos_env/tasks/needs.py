@@ -15,6 +15,8 @@ DEFAULT_SCENARIO: Mapping[str, str] = {
     "gap": "gap",
     "rendezvous": "hall",
     "follow": "hall",
+    "observe": "hall",
+    "escort": "open",
 }
 """Task to its default scenario."""
 

@@ -45,6 +45,25 @@ def travel(
     Raises:
         EnvError: An option is out of range, or the formation does not fit in the room.
     """
+    formation, motion = plan_travel(
+        n_cars, room, shape, spacing, speed, path, closed, turning, heading, lookahead
+    )
+    return MovingFormation(n_cars, n_envs, formation, motion)
+
+
+def plan_travel(
+    n_cars: int,
+    room: tuple[float, float],
+    shape: str | Sequence[Sequence[float]] | F64,
+    spacing: float | None,
+    speed: float,
+    path: str | Sequence[Sequence[float]] | F64,
+    closed: bool,
+    turning: bool,
+    heading: float,
+    lookahead: float,
+) -> tuple[Formation, Motion]:
+    """Return the formation and its motion from the options of `travel`."""
     heading, closed, turning = (
         finite("heading", heading), flag("closed", closed), flag("turning", turning)
     )  # fmt: skip
@@ -59,4 +78,4 @@ def travel(
         heading=heading,
         lookahead=not_negative("lookahead", lookahead),
     )
-    return MovingFormation(n_cars, n_envs, formation, motion)
+    return formation, motion

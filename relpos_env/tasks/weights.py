@@ -29,6 +29,8 @@ DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "hold": {"formation": 1.0, "place": 0.3, **_CARE, "progress": 5.0},
         "travel": {**_MOVING, "time": 1.2},
         "follow": {**_MOVING, "time": 1.2},
+        "observe": {**_MOVING, "information": 1.0, "time": 1.2},
+        "escort": _MOVING,
         "gap": _ENDING,
         "rendezvous": _ENDING,
     }

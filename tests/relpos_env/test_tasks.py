@@ -147,10 +147,12 @@ def test_the_plan_knows_nothing_of_the_truth(name):
     state = rooms(2, 4, seed=2)
     task = begun(name, state)
     update(task, state, 3.0)
-    kept = [a.copy() for a in (task.plan, task.goal_w, task.target)]
+    # In `escort` goals are relative to a car that nobody plans; policies do not observe goals.
+    known = [task.plan, task.target, *([task.goal_w] if name != "escort" else [])]
+    kept = [a.copy() for a in known]
     other = rooms(2, 4, seed=9)
     update(task, other, 3.0)
-    for before, after in zip(kept, (task.plan, task.goal_w, task.target), strict=True):
+    for before, after in zip(kept, known, strict=True):
         assert np.array_equal(before, after)
 
 

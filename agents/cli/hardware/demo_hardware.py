@@ -35,7 +35,8 @@ from agents.errors import UsageError
 @click.option(
     "--controller",
     metavar="NAME",
-    help="Controller that drives: consensus, leader-follower or range-only.  [default: consensus]",
+    help="Controller that drives: consensus, leader-follower, range-only or weaving.  "
+    "[default: consensus]",
 )
 @click.option(
     "--format",

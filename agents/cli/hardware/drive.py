@@ -29,7 +29,8 @@ EVERY = 10
 @click.option(
     "--controller",
     metavar="NAME",
-    help="Controller that drives: consensus, leader-follower or range-only.  [default: consensus]",
+    help="Controller that drives: consensus, leader-follower, range-only or weaving.  "
+    "[default: consensus]",
 )
 @click.option("--observation", help="Observation mode.  [default: that of the policy, or estimate]")
 @click.option("--arm", is_flag=True, help="Allow the cars to move; without it no command is sent.")

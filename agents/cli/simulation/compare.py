@@ -108,8 +108,8 @@ def compare(
 ) -> None:
     """Compare drivers on the same episodes: formation error, collisions, energy, with intervals.
 
-    NAME is a controller (consensus, leader-follower, range-only) or a trained policy: its name,
-    its file or its folder.
+    NAME is a controller (consensus, leader-follower, range-only, weaving) or a trained policy: its
+    name, its file or its folder.
 
     With --config, the comparison runs on real cars in real time, with estimated errors. Keys on a
     terminal: space stops all cars immediately, c clears the stop, q quits.
