@@ -42,6 +42,7 @@ TABLES: dict[str, Callable[[], str]] = {
     **{f"env-growth-{name}": partial(env_speed.growth, name) for name in env_speed.CURVES},
     "tracker-cost": measured.tracker_cost,
     "policy-results": measured.policy_results,
+    "observe-results": measured.observe_results,
     "room-results": measured.room_results,
     "recording-results": measured.recording_results,
     "mds-results": measured.mds_results,

@@ -84,6 +84,24 @@ def policy_results() -> str:
     return markdown(head, rows, right=", ".join(head[3:]))
 
 
+def observe_results() -> str:
+    """Return the table of tracking errors with and without weaving."""
+    head = ("task, scenario", "cars", "controller", "tracking error [m]", "95 %", "ratio",
+            "formation error [m]", "95 %", "collisions/min", "in contact")  # fmt: skip
+    rows, plain = [], 1.0
+    for r in measured("observe-results"):
+        is_first = r["policy"] == "consensus"
+        plain = r["tracking_error"] if is_first else plain
+        spans = ["{:.3f} to {:.3f}".format(*r[k]) for k in ("tracking_error_ci95", "ci95")]
+        rows.append([
+            f"`{r['task']}`, `{r['scenario']}`" if is_first else "", str(r["cars"]), r["policy"],
+            f"{r['tracking_error']:.3f}", spans[0], f"{r['tracking_error'] / plain:.2f}",
+            f"{r['formation_error']:.3f}", spans[1], f"{r['collisions_per_min']:.1f}",
+            f"{100.0 * r['contact_time']:.1f} %",
+        ])  # fmt: skip
+    return markdown(head, rows, right=", ".join(head[3:]))
+
+
 def results(is_recording: bool) -> list[dict[str, Any]]:
     """Return the result lines of recordings or of simulated rooms."""
     lines = [json.loads(line) for line in RESULTS.read_text().splitlines()]

@@ -41,9 +41,7 @@ def test_uncertain_cars_keep_turning_to_their_side(steering):
 
 def test_an_uncertain_car_turns_back_beyond_the_width():
     row = observed(0.15, steering=0.2)
-    row[WHERE["command"]] = 0.7 * np.array(
-        [np.cos(-0.15), np.sin(-0.15)]
-    )  # its way is to the right
+    row[WHERE["command"]] = 0.7 * np.array([np.cos(-0.15), np.sin(-0.15)])  # to the right
     weaving = Weaving(FIELDS, WeavingParams(width=0.1, push=0.1))
     assert weaving.act(row)[1] < Consensus(FIELDS).act(row)[1]
 
