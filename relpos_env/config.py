@@ -15,6 +15,7 @@ from relpos_env.interface.actions import ActionMode, action_mode
 from relpos_env.interface.observations import ModeBuilder, ObservationMode, observation_mode
 from relpos_env.interface.rangefinders import MAX_RANGEFINDERS
 from relpos_env.registry import look_up
+from relpos_env.rewards import REWARDS
 from relpos_env.scenarios import Scenario
 from relpos_env.scenarios import scenario as find_scenario
 from relpos_env.sensors.operator import OperatorSimParams
@@ -86,8 +87,8 @@ class FormationConfig:
     `relpos_env.world.pymunk_space`; ``fast``: equal motion without contacts, for batches. The
     default is ``pymunk`` in the PettingZoo and Gymnasium environments, ``fast`` in vector forms."""
     reward: str | RewardTerm | None = None
-    """Your own reward term, ``(formation) -> (env, car)``, which is added to the others; infos
-    contain it as ``reward_own``."""
+    """Reward term that is added to those of the task, ``(formation) -> (env, car)``: your own, or
+    ``information``, for certain estimates; infos contain it as ``reward_own``."""
     gate: bool = False
     """True to apply the safety gate of real cars, `hardware_bridge.safety.gate`, to all commands;
     infos contain the allowed commands and the reasons."""
@@ -145,7 +146,7 @@ class FormationConfig:
             task_options=options,
             reward=None
             if self.reward is None
-            else look_up({}, self.reward, "reward", group="relpos_env.rewards"),
+            else look_up(REWARDS, self.reward, "reward", group="relpos_env.rewards"),
             mode=observation_mode(self.observation, n_cars, config.proximity),
             actions=action_mode(self.actions),
             params=default_params(scenario, n_cars, self.trackers)

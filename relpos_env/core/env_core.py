@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from relpos_env.config import Parts, RewardTerm, whole_number
+from relpos_env.config import Parts, whole_number
 from relpos_env.core._outcome_kernels import TeamResults, judge, tracking_errors
 from relpos_env.core.command_gate import make_gate
+from relpos_env.core.own_rewards import check_task_rewards, own_reward
 from relpos_env.core.reset_options import ResetOptions
 from relpos_env.core.tracked_world import TrackedWorld
 from relpos_env.errors import EnvError
@@ -184,7 +185,10 @@ class EnvCore:
         self.cycles += 1
         self._judge(everything)
         if self.parts.reward is not None:
-            self._add_own_reward(self.parts.reward)
+            own = own_reward(self.parts.reward, self, self.state.present)
+            self.own_reward[:] = own
+            self.rewards += own
+            self.team.reward[:] += own.sum(axis=1) / np.maximum(self.active.sum(axis=1), 1)
         self._observe(everything)
 
     @property
@@ -238,32 +242,7 @@ class EnvCore:
         else:
             judge(envs.start, envs.stop, *self._verdict)
         if self._is_own_task:
-            self._check_task_rewards()
-
-    def _check_task_rewards(self) -> None:
-        """Check the rewards of a task from outside the package.
-
-        Raises:
-            EnvError: A reward term is not a finite number.
-        """
-        finite = np.isfinite(self.task.rewards).all(axis=(0, 1))
-        if not finite.all():
-            term = self.task.terms[int(np.argmin(finite))]
-            raise EnvError(f"task {self.parts.config.task!r}, reward {term!r}: expected numbers")
-
-    def _add_own_reward(self, term: RewardTerm) -> None:
-        """Add the user's term to the rewards of the cars in the room.
-
-        Raises:
-            EnvError: The term does not return a finite number for each car.
-        """
-        own = np.asarray(term(self), dtype=np.float64)
-        if own.shape != self.rewards.shape or not np.isfinite(own).all():
-            raise EnvError(f"reward: expected finite numbers {self.rewards.shape}, got {own!r}")
-        self.own_reward[:] = np.where(self.state.present, own, 0.0)
-        self.rewards += self.own_reward
-        n = np.maximum(self.active.sum(axis=1), 1)
-        self.team.reward[:] += self.own_reward.sum(axis=1) / n
+            check_task_rewards(self.parts.config.task, self.task)
 
     def _observe(self, envs: slice | Sequence[int]) -> None:
         """Write the observations of some environments; those of the others do not change.

@@ -15,6 +15,20 @@ INFORMATION_SCALE = 0.1
 """[m] Expected error of a relative position at which the information term is exp(-1)."""
 
 
+def information_of(cov: F64, ok: Bool, present: Bool) -> F64:
+    """Return exp(-expected error / `INFORMATION_SCALE`), 0 if unusable, of the others in the mean.
+
+    Args:
+        cov: Covariances xx, yy, xy of relative positions, (env, car, other, 3) [m2].
+        ok: True for usable estimates, (env, car, other).
+        present: True where the car is present, (env, car).
+    """
+    both = present[:, :, None] & present[:, None] & ~np.eye(present.shape[1], dtype=bool)
+    expected = np.sqrt(cov[..., 0] + cov[..., 1])
+    gain = np.where(ok & both, np.exp(-expected / INFORMATION_SCALE), 0.0)
+    return np.asarray(gain.sum(axis=-1) / np.maximum(both.sum(axis=-1), 1))
+
+
 class Observe(MovingFormation):
     """A formation that follows a path, rewarded for small expected errors of its estimates."""
 
@@ -25,12 +39,8 @@ class Observe(MovingFormation):
         super().__init__(n_cars, n_envs, formation, motion, more_terms=("information",))
 
     def inform(self, cov: F64, ok: Bool, envs: slice) -> None:
-        """Write the information term: mean over the other present cars, 0 if not usable."""
-        here = self._assigned[envs]
-        both = here[:, :, None] & here[:, None] & ~np.eye(self.n_cars, dtype=bool)
-        expected = np.sqrt(cov[envs, ..., 0] + cov[envs, ..., 1])
-        gain = np.where(ok[envs] & both, np.exp(-expected / INFORMATION_SCALE), 0.0)
-        self.rewards[envs, :, -1] = gain.sum(axis=-1) / np.maximum(both.sum(axis=-1), 1)
+        """Write the information term."""
+        self.rewards[envs, :, -1] = information_of(cov[envs], ok[envs], self._assigned[envs])
 
 
 def observe(

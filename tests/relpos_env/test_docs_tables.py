@@ -90,16 +90,20 @@ def test_arguments_of_the_forms_are_told(form):
 @pytest.mark.parametrize(
     "code", snippets("reference/environment.md"), ids=lambda c: c.splitlines()[0]
 )
+@pytest.mark.filterwarnings("ignore:Creating .*WeightUpdater:DeprecationWarning")
 def test_snippets_run(code, tmp_path, monkeypatch):
     if "sb3" in code:
         pytest.importorskip("stable_baselines3")
     if "torchrl" in code:
         pytest.importorskip("torchrl")
     monkeypatch.chdir(tmp_path)
-    exec(compile(code, "environment.md", "exec"), {})
+    exec(compile(code.replace("96_000", "1600"), "environment.md", "exec"), {})
 
 
-@pytest.mark.parametrize("code", snippets("how-to/adding.md"), ids=lambda c: c.splitlines()[0])
+QUOTED = [code for code in snippets("how-to/adding.md") if code.startswith("# ")]
+
+
+@pytest.mark.parametrize("code", QUOTED, ids=lambda c: c.splitlines()[0])
 def test_quoted_code_is_that_of_the_file(code):
     """The first line names the file; a line of three dots marks an omission."""
     name, _, quoted = code.partition("\n")

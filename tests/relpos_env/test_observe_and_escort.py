@@ -32,6 +32,16 @@ def test_information_is_that_of_the_own_estimates():
     assert informed > 0
 
 
+def test_any_task_can_have_it():
+    env = formation_v0.parallel_env(task="observe", scenario="open", reward="information")
+    *_, infos = list(steps(env, 5))[-1]
+    for info in infos.values():
+        assert info["reward_own"] == info["reward_information"]
+    env = formation_v0.parallel_env(task="hold", reward="information")
+    *_, infos = list(steps(env, 5))[-1]
+    assert all(0.0 <= info["reward_own"] <= 1.0 for info in infos.values())
+
+
 def test_information_is_not_that_of_the_truth():
     """Policies that observe the truth are rewarded for the estimates all the same."""
     rewards = []

@@ -1,8 +1,5 @@
 """TorchRL: its checker, masks, resets of some environments, the same episodes as other forms."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 from runs import bits, busy
@@ -132,11 +129,3 @@ def test_same_seed_same_rollout():
 def test_wrong_arguments_are_named(num_envs, kwargs, message):
     with pytest.raises(EnvError, match=message):
         FormationTorchEnv(num_envs, **kwargs)
-
-
-@pytest.mark.filterwarnings("ignore:Creating .*WeightUpdater:DeprecationWarning")
-def test_the_training_of_the_documentation_runs():
-    page = Path(__file__).parents[2] / "docs" / "reference" / "environment.md"
-    codes = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
-    (code,) = [code for code in codes if "ClipPPOLoss" in code]
-    exec(code.replace("96_000", "1600"), {})
