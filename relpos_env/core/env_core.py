@@ -185,8 +185,7 @@ class EnvCore:
         self.cycles += 1
         self._judge(everything)
         if self.parts.reward is not None:
-            own = own_reward(self.parts.reward, self, self.state.present)
-            self.own_reward[:] = own
+            self.own_reward[:] = own = own_reward(self.parts.reward, self, self.state.present)
             self.rewards += own
             self.team.reward[:] += own.sum(axis=1) / np.maximum(self.active.sum(axis=1), 1)
         self._observe(everything)
