@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from relpos_env.interface.observations.base import F32
 
 
+@runtime_checkable
 class Driver(Protocol):
     """A stateless control law for every car; any memory is part of the observation."""
 

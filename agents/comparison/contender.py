@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from agents.comparison.trained import find_trained
-from agents.controllers import CONTROLLERS, controller_builder
+from agents.controllers import CONTROLLERS, build_controller, controller_builder
 from agents.driver import Driver
 from agents.errors import UsageError
 from agents.policies import shipped_names
@@ -62,7 +62,7 @@ class ControllerEntry:
     def driver(self, observation: str, n_cars: int, proximity: int) -> Driver:
         """Return the controller for an observation mode."""
         fields = observation_mode(observation, n_cars, proximity).fields
-        return controller_builder(self.title)(fields)
+        return build_controller(self.title, fields)
 
 
 def find_controller(name: str) -> Entry | None:

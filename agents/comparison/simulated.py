@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from gymnasium.utils import seeding
 
+from agents.errors import UsageError
 from relpos_env.config import Parts
 from relpos_env.core.env_core import EnvCore
 from relpos_env.interface.observations.base import F32
@@ -108,7 +109,14 @@ class Simulated:
 
     def step(self, actions: F32) -> None:
         """Run one control step of all cars; see `Running`."""
-        self.formation.step(*self.formation.parts.actions.decode(actions, "actions"))
+        mode = self.formation.parts.actions
+        expected = (*self.formation.rewards.shape, *mode.shape)
+        if np.shape(actions) != expected:
+            raise UsageError(
+                f"actions of the driver: expected {expected[1:]} of an environment, got "
+                f"{np.shape(actions)[1:]}"
+            )
+        self.formation.step(*mode.decode(actions, "actions of the driver"))
 
     def close(self) -> None:
         """Release the batch."""

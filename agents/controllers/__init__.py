@@ -10,7 +10,7 @@ from agents.controllers.range_only import RangeOnly, RangeOnlyParams
 from agents.controllers.weaving import Weaving, WeavingParams
 from agents.driver import Driver
 from relpos_env.interface.observations import Field
-from relpos_env.registry import look_up
+from relpos_env.registry import build, look_up
 
 ControllerBuilder = Callable[[tuple[Field, ...]], Driver]
 
@@ -36,6 +36,20 @@ def controller_builder(name: str | ControllerBuilder) -> ControllerBuilder:
     return look_up(CONTROLLERS, name, "controller", group="relpos_env.controllers")
 
 
+def build_controller(name: str | ControllerBuilder, fields: tuple[Field, ...]) -> Driver:
+    """Build a controller.
+
+    Args:
+        name: As for `controller_builder`.
+        fields: Fields of the observations.
+
+    Raises:
+        EnvError: There is no controller of this name, or it is something else than a controller.
+    """
+    expected = "controller: expected a function (fields) that returns a Driver"
+    return build(controller_builder(name), name, (fields,), Driver, expected)
+
+
 __all__ = [
     "CONTROLLERS",
     "Consensus",
@@ -46,5 +60,6 @@ __all__ = [
     "RangeOnlyParams",
     "Weaving",
     "WeavingParams",
+    "build_controller",
     "controller_builder",
 ]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,17 +10,17 @@ from typing import Any, Literal
 
 import numpy as np
 
+from agents.evaluation.estimates_csv import pair_name
 from tracking.arrays import F64, Bool
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
-from tracking.estimate import Status, TeamEstimate
+from tracking.estimate import TeamEstimate
 from tracking.filters import DEFAULT_FILTER
 from tracking.findings import Finding, examine, find_in_estimates, refuse_errors
 from tracking.late_data.horizon import HorizonParams
 from tracking.log import Log, read_log
 from tracking.measurements import MeasurementBlock
 from tracking.metrics.bound import Bound
-from tracking.metrics.integrity import protection_radius
 from tracking.metrics.score import Score, score
 from tracking.params.short_repr import short_repr
 from tracking.tracker import Tracker, TrackerParams
@@ -264,35 +262,6 @@ def _smoothed(tracker: Tracker, block: MeasurementBlock, chunk: slice, t_out: F6
     names = TeamEstimate.__slots__[1:]
     stacked = (np.stack([getattr(e, n) for e in found], axis=1) for n in names)
     return TeamEstimate(rest.constellation, *stacked)
-
-
-def pair_name(constellation: Constellation, pair: int) -> str:
-    """Return the name of a pair from the ids of its nodes, "1-2"."""
-    i, j = constellation.pairs[pair]
-    return f"{constellation.ids[i]}-{constellation.ids[j]}"
-
-
-def estimates_csv(estimate: TeamEstimate) -> str:
-    """Return a run as CSV: one row per time and pair with an estimate."""
-    constellation = estimate.constellation
-    ids = [(constellation.ids[i], constellation.ids[j]) for i, j in constellation.pairs]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ["t_s", "node_i", "node_j", "x", "y", "z", "vx", "vy", "vz", "sx", "sy", "sz",
-         "protection", "status"]
-    )  # fmt: skip
-    std, radius = estimate.pos_std, protection_radius(estimate)
-    for k, t in enumerate(estimate.t):
-        for p, (i, j) in enumerate(ids):
-            status = Status(int(estimate.status[k, p]))
-            if status in (Status.ABSENT, Status.STARTING):
-                continue
-            numbers = (*estimate.pos_ij_w[k, p], *estimate.vel_ij_w[k, p], *std[k, p])
-            within = f"{radius[k, p]:.5f}" if np.isfinite(radius[k, p]) else ""
-            row = [f"{t:.6f}", i, j, *(f"{v:.5f}" for v in numbers), within, status.name.lower()]
-            writer.writerow(row)
-    return text.getvalue()
 
 
 def _join(constellation: Constellation, parts: Sequence[TeamEstimate]) -> TeamEstimate:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from agents.evaluation.track import ERRORS, TrackResult, pair_name
+from agents.evaluation.estimates_csv import pair_name
+from agents.evaluation.track import ERRORS, TrackResult
 from agents.reports.page import Page, metres, percent
 from agents.reports.style import in_style, new_figure
 from tracking.estimate import Status

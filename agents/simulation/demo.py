@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from agents.comparison.blindfold import Blindfold
-from agents.controllers import controller_builder
+from agents.controllers import build_controller
 from agents.driver import Driver
 from agents.errors import UsageError
 from agents.evaluation.track import TrackResult, track_log
@@ -178,7 +178,7 @@ def demo(
         )
         driver: Driver
         if trained is None:
-            driver = controller_builder(controller)(env.fields)
+            driver = build_controller(controller, env.fields)
         else:
             driver = trained.driver(Layout(mode, len(env.possible_agents), history, proximity or 0))
         drives[information] = drive(

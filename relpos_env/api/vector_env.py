@@ -17,7 +17,7 @@ from relpos_env.api.gym_env import (
 from relpos_env.api.state_space import state_space, truth_inside
 from relpos_env.config import configure, whole_number
 from relpos_env.core.env_core import MOST_ENVS, NO_OPTIONS, EnvCore
-from relpos_env.core.reset_options import ResetOptions, reset_options
+from relpos_env.core.reset_options import ResetOptions, checked_options, reset_options
 from relpos_env.errors import EnvError
 from relpos_env.interface.infos import team_columns, vector_infos
 from relpos_env.interface.observations.base import F32
@@ -117,7 +117,7 @@ class FormationVectorEnv(VectorEnv[F32, Any, Any]):
                 or an option is unknown or cannot be fulfilled.
         """
         seeds = seeds_of_batch(seed, self.num_envs)
-        options = dict(options or {})
+        options = dict(checked_options(options))
         mask = np.asarray(options.pop("reset_mask", np.ones(self.num_envs, dtype=bool)))
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
             raise EnvError(f"reset_mask: expected {self.num_envs} flags, some True, got {mask}")

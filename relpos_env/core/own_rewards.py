@@ -21,7 +21,7 @@ def check_task_rewards(name: object, task: Task) -> None:
     finite = np.isfinite(task.rewards).all(axis=(0, 1))
     if not finite.all():
         term = task.terms[int(np.argmin(finite))]
-        raise EnvError(f"task {name!r}, reward {term!r}: expected numbers")
+        raise EnvError(f"task {name!r}, reward {term!r}: expected finite numbers")
 
 
 def own_reward(term: Callable[[Any], Any], formation: Any, present: Bool) -> F64:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -73,17 +74,32 @@ def reset_options(options: Mapping[str, Any] | None, parts: Parts) -> ResetOptio
     Raises:
         EnvError: An option is unknown or has a wrong shape.
     """
-    options = options or {}
+    options = checked_options(options)
     for name in options:
         if name not in KNOWN:
             raise EnvError(f"options: expected names among {', '.join(KNOWN)}, got {name!r}")
     poses, goals = options.get("poses"), options.get("goals")
     requested = options.get("scenario")
+    if not isinstance(requested, str | Path | Scenario | None):
+        raise EnvError(
+            f"options: scenario: expected a name, a path or a scenario, got {requested!r}"
+        )
     return ResetOptions(
         poses=None if poses is None else _rows("poses", poses, 3),
         goals=None if goals is None else _rows("goals", goals, 2),
         scenario=None if requested is None else _fitting(find_scenario(requested), parts),
     )
+
+
+def checked_options(options: Any) -> Mapping[str, Any]:
+    """Return options of a reset, none for None.
+
+    Raises:
+        EnvError: They are not a mapping.
+    """
+    if options is not None and not isinstance(options, Mapping):
+        raise EnvError(f"options: expected a dict, got {options!r}")
+    return options or {}
 
 
 def _rows(name: str, value: Any, columns: int) -> F64:

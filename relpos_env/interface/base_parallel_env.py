@@ -151,6 +151,8 @@ class BaseFormationParallelEnv(ParallelEnv, ABC):  # type: ignore[misc]
             self._group.seed(0, self._rng)
         self._begun = False  # until all options are applied
         # The PettingZoo test suite passes an option named "options".
+        if not isinstance(options, dict | None):
+            raise EnvError(f"options: expected a dict, got {options!r}")
         self._begin({name: what for name, what in (options or {}).items() if name != "options"})
         self._begun = True
         active = self._group.active[0]

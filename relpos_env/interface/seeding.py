@@ -36,12 +36,16 @@ def seeds_of_batch(seed: int | Sequence[int | None] | None, n_envs: int) -> list
         n_envs: Number of environments.
 
     Raises:
-        EnvError: The number of seeds is not the number of environments.
+        EnvError: A seed is not an integer of at least 0, or their number is not that of the
+            environments.
     """
     if seed is None:
         return [None] * n_envs
-    if isinstance(seed, int | np.integer):
+    if isinstance(seed, str) or not isinstance(seed, Sequence | np.ndarray):
+        episode_rng(seed)
         return [int(seed) + k for k in range(n_envs)]
     if len(seed) != n_envs:
         raise EnvError(f"seed: expected {n_envs} seeds, got {len(seed)}")
-    return list(seed)
+    for one in seed:
+        episode_rng(one)
+    return [None if one is None else int(one) for one in seed]

@@ -67,7 +67,9 @@ def make_task(
     known = [p for p in inspect.signature(builder).parameters if p not in _ALWAYS]
     for option in options:
         if option not in known:
-            raise EnvError(f"{option}: task {name!r} expected options among {', '.join(known)}")
+            raise EnvError(
+                f"task_options: task {name!r} expected {', '.join(known) or 'none'}, got {option!r}"
+            )
     return build(builder, name, (n_cars, n_envs, room), Task, _EXPECTED, options=options)
 
 

@@ -27,7 +27,10 @@ BAD_ARGUMENTS = [
     ),
     ({"filter": "magic"}, "filter: expected one of"),
     ({"task": "none"}, "task: expected one of ring, .* got 'none'"),
-    ({"task": "ring", "task_options": {"colour": 1}}, "colour: task 'ring' expected options among"),
+    (
+        {"task": "ring", "task_options": {"colour": 1}},
+        "task_options: .* got 'colour'",
+    ),
     ({"task": "ring", "task_options": {"half_axes": (1.0, -1.0)}}, "half_axes: expected"),
     ({"weights": {"beauty": 1.0}}, "weights: expected terms among"),
     ({"weights": {"formation": np.nan}}, "weights: formation"),
@@ -43,7 +46,10 @@ BAD_ARGUMENTS = [
     ({"max_cycles": 1.5}, "max_cycles: expected a whole number"),
     ({"history": 0}, "history: expected a whole number from 1 to 64, got 0"),
     ({"render_mode": "ansi"}, "render_mode: expected None, rgb_array or human, got 'ansi'"),
-    ({"task": "ring", "task_options": {"room": (9.0, 9.0)}}, "room: task 'ring' expected options"),
+    (
+        {"task": "ring", "task_options": {"room": (9.0, 9.0)}},
+        "task_options: .* got 'room'",
+    ),
     ({"task": "gap", "task_options": {"gap": 0.8}}, "gap: expected a relpos_env.scenarios.Gap"),
     ({"task_options": None}, "task_options: expected Mapping, got None"),
     ({"weights": ["collision"]}, "weights: expected Mapping or None, got"),
@@ -275,3 +281,25 @@ def test_what_is_written_into_an_info_stays_there():
         assert all("mine" not in info for info in infos)
         infos[0]["mine"] = 1
     assert all("mine" not in info for info in env.reset_infos)
+
+
+FORMS_OF_ONE = [parallel_env, FormationGymEnv]
+
+
+@pytest.mark.parametrize("options", [5, [1], "goals"])
+@pytest.mark.parametrize("form", [*FORMS_OF_ONE, lambda: FormationVectorEnv(2)])
+def test_options_that_are_no_dict_are_named(form, options):
+    with pytest.raises(EnvError, match="options: expected a dict, got"):
+        form().reset(seed=0, options=options)
+
+
+@pytest.mark.parametrize("form", [*FORMS_OF_ONE, lambda: FormationVectorEnv(2)])
+def test_a_scenario_of_another_type_is_named(form):
+    with pytest.raises(EnvError, match="options: scenario: expected a name, .*, got 5"):
+        form().reset(seed=0, options={"scenario": 5})
+
+
+@pytest.mark.parametrize("seed", [1.5, "a", True, -1, [0, -1], [0, "b"]])
+def test_seeds_of_batches_that_are_no_whole_numbers_are_named(seed):
+    with pytest.raises(EnvError, match="seed: expected a whole number of at least 0, got"):
+        FormationVectorEnv(2).reset(seed=seed)

@@ -399,9 +399,9 @@ def test_a_window_the_user_closed_stays_closed(screen):
 
 def test_without_pygame_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(EnvError, match=r"pip install relpos-env\[render\]"):
+    with pytest.raises(EnvError, match=r"pip install -e '\.\[render\]'"):
         Renderer()
-    with pytest.raises(EnvError, match=r"pip install relpos-env\[render\]"):
+    with pytest.raises(EnvError, match=r"pip install -e '\.\[render\]'"):
         save_snapshot(make_snapshot(), "never.png")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
+from agents import compare
 from agents.comparison.contender import find_entry
 from agents.controllers import CONTROLLERS, controller_builder
 from agents.errors import UsageError
@@ -151,6 +152,29 @@ class Lost(Rendezvous):
         return n_changed
 
 
+def flat(fields):
+    """A controller whose actions are not those of the cars."""
+
+    class Flat:
+        def act(self, observations):
+            return np.zeros(3)
+
+    return Flat()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("flat", r"actions of the driver: expected \(3, 2\) of an environment, got \(3,\)"),
+        ("Meet", "controller: expected a function .* returns a Driver, got"),
+        ("Creep", "controller: expected a function .* returns a Driver, got"),
+    ],
+)
+def test_what_is_no_controller_is_refused(name, message):
+    with pytest.raises((EnvError, UsageError), match=message):
+        compare(drivers=[f"{HERE}:{name}"], episodes=1, seconds=3.0, settle=1.0)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -168,7 +192,7 @@ def test_parts_of_the_wrong_kind_are_named(arguments, message):
 
 
 def test_a_task_whose_reward_is_no_number_is_named():
-    with pytest.raises(EnvError, match=r"task .*Lost.*, reward 'progress': expected numbers"):
+    with pytest.raises(EnvError, match=r"task .*Lost.*, reward 'progress': expected finite"):
         parallel_env(task=Lost).reset(seed=0)
 
 

@@ -37,7 +37,9 @@ def look_up(
     """
     if isinstance(name, str) and name in registry:
         return registry[name]
-    expected = f"{argument}: expected one of {', '.join(registry)}"
+    expected = f"{argument}: expected " + (
+        f"one of {', '.join(registry)}" if registry else "a name"
+    )
     if not group:
         raise raises(f"{expected}, got {name!r}")
     if callable(name):

@@ -50,7 +50,7 @@ WHY = "which has its own cars and task; they drive one after the other"
     multiple=True,
     default=("ring",),
     show_default=True,
-    help="Task: ring, hold, travel, gap, rendezvous or follow; repeatable.",
+    help="Task: ring, hold, travel, gap, rendezvous, follow, observe or escort; repeatable.",
 )
 @cars_option
 @click.option(

@@ -183,7 +183,7 @@ def _check_numbers(skip: float, accuracy: float | None) -> None:
 
 
 def _write(out: Path, results: Sequence[Any]) -> None:
-    from agents.evaluation.track import estimates_csv
+    from agents.evaluation.estimates_csv import estimates_csv
     from agents.output import write_results
     from agents.reports.track_report import track_report
 
@@ -197,7 +197,8 @@ def _write(out: Path, results: Sequence[Any]) -> None:
 
 def print_tracks(results: Sequence[Any]) -> None:
     """Print the errors over all pairs and of each pair."""
-    from agents.evaluation.track import ERRORS, pair_name
+    from agents.evaluation.estimates_csv import pair_name
+    from agents.evaluation.track import ERRORS
     from agents.reports.page import metres, percent
 
     rows = []

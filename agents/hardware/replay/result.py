@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.evaluation.track import pair_name
+from agents.evaluation.estimates_csv import pair_name
 from agents.hardware.live.snapshot import Snapshot
 from hardware_bridge.config import SwarmConfig
 from hardware_bridge.recording import Recording

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.evaluation.track import pair_name
+from agents.evaluation.estimates_csv import pair_name
 from agents.hardware.live.snapshot import Snapshot
 from tracking.arrays import F64, Bool
 from tracking.estimate import TeamEstimate
