@@ -20,6 +20,7 @@ from agents.controllers.base import Plane, Sight, length
 from agents.controllers.consensus import ConsensusParams, correction
 from agents.controllers.correcting import Correcting
 from relpos_env.interface.observations import Field
+from tracking.arrays import F64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,10 +39,10 @@ class WeavingParams(ConsensusParams):
 
 
 class Weaving(Correcting[WeavingParams]):
-    """Consensus that drives for information; it needs the covariance of the estimates."""
+    """Consensus that drives for information; without covariances it always weaves."""
 
     name = "weaving"
-    observations = ("estimate_cov",)
+    observations = ("estimate", "estimate_cov", "truth")
 
     def __init__(self, fields: tuple[Field, ...], params: WeavingParams | None = None) -> None:
         """Check the fields, see `Correcting`; None uses the default parameters."""
@@ -50,13 +51,16 @@ class Weaving(Correcting[WeavingParams]):
     def correction(self, sight: Sight) -> Plane:
         """Return the correction of `consensus` plus the lateral velocity of the weave."""
         x, y = correction(sight, self.params)
-        if sight.certainty is None:
-            return x, y
         q = self.params
         way = sight.command[0] + x, sight.command[1] + y
         off = np.arctan2(way[1], way[0])
         side = np.where(np.abs(off) > q.width, np.sign(off), np.sign(sight.steering))
-        expected = np.hypot(sight.certainty.ahead, sight.certainty.left)
+        return x, y + q.push * self._share(sight) * side * length(way)
+
+    def _share(self, sight: Sight) -> F64 | float:
+        """Return the share of `push` for the uncertainty of the others, 0 to 1, (...)."""
+        if sight.certainty is None:
+            return 1.0
+        q, expected = self.params, np.hypot(sight.certainty.ahead, sight.certainty.left)
         worst = np.where(sight.used, expected, 0.0).max(axis=-1, initial=0.0)
-        share = np.clip((worst - q.certain) / (q.uncertain - q.certain), 0.0, 1.0)
-        return x, y + q.push * share * side * length(way)
+        return np.asarray(np.clip((worst - q.certain) / (q.uncertain - q.certain), 0.0, 1.0))

@@ -5,7 +5,6 @@ import pytest
 
 from agents import compare
 from agents.controllers import Consensus, Weaving, WeavingParams
-from agents.errors import UsageError
 from relpos_env.interface.observations import observation_mode
 
 FIELDS = observation_mode("estimate_cov", 3).fields
@@ -46,9 +45,15 @@ def test_an_uncertain_car_turns_back_beyond_the_width():
     assert weaving.act(row)[1] < Consensus(FIELDS).act(row)[1]
 
 
-def test_it_needs_the_covariance():
-    with pytest.raises(UsageError, match="weaving expects one of estimate_cov, got estimate"):
-        Weaving(observation_mode("estimate", 3).fields)
+def test_without_covariances_it_always_weaves():
+    fields = observation_mode("estimate", 3).fields
+    row = np.zeros(sum(f.size for f in fields), np.float32)
+    first = 0
+    for f in fields:
+        values = {"mask": 1.0, "command": [0.7, 0.0], "heading": [1.0, 0.0], "motion": [0.7, 0.1]}
+        row[first : first + f.size] = values.get(f.name, 0.0)
+        first += f.size
+    assert Weaving(fields).act(row)[1] > Consensus(fields).act(row)[1]
 
 
 def test_it_makes_estimates_better_and_keeps_the_formation():
