@@ -145,8 +145,8 @@ class TeamEstimate:
     def _check_nodes(self, method: str, *indices: int) -> None:
         n = self.constellation.n_nodes
         for k in indices:
-            if not 0 <= k < n:
-                raise ConfigError(f"{method}: expected node indices 0 to {n - 1}, got {k}")
+            if not isinstance(k, int | np.integer) or isinstance(k, bool) or not 0 <= k < n:
+                raise ConfigError(f"{method}: expected node indices 0 to {n - 1}, got {k!r}")
 
     def at(self, t: F64 | float) -> TeamEstimate:
         """Predict the estimate at another time with constant velocity.

@@ -53,6 +53,8 @@ class Tracker:
         filter: str | FilterBuilder = DEFAULT_FILTER,
         n_envs: int = 1,
     ) -> None:
+        if not isinstance(constellation, Constellation):
+            raise ConfigError(f"constellation: expected a Constellation, got {constellation!r}")
         if n_envs < 1:
             raise ConfigError(f"n_envs: expected 1 or more, got {n_envs}")
         params = params or TrackerParams()

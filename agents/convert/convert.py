@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from agents.convert.captures import Capture
 from agents.convert.log import build_log, check_log
 from agents.convert.mapping import OF_CAPTURES, TABLES, Mapping, Plan, read_plan
 from agents.convert.rows import read_rows
-from agents.convert.sources import Source, pattern
+from agents.convert.sources import Record, Source, pattern
 from agents.convert.tables import Tables
 from agents.errors import UsageError
 from tracking.arrays import F64
@@ -101,9 +101,6 @@ def convert(
         tables, used = _read(plan, opened, progress or (lambda _: None))
         taken = {stream for use in used for stream in use.streams}
         unused = tuple(name for name in opened.names() if name not in taken)
-    for use in used:
-        if not use.rows and not use.left_out:
-            raise UsageError(f"[[{use.table}]] {', '.join(use.streams)}: expected rows, found none")
     if "ranges" not in tables:
         left_out = sum(use.left_out for use in used if use.table == "ranges")
         text = f"found none and {left_out} that are invalid or of other nodes"
@@ -125,6 +122,13 @@ def _with_streams(plan: Plan, names: list[str]) -> Plan:
     return replace(plan, mapping=replace(plan.mapping, **found))
 
 
+def _noted(records: Iterable[Record], seen: set[str]) -> Iterator[Record]:
+    """Yield records, and add their streams to a set."""
+    for record in records:
+        seen.add(record.stream)
+        yield record
+
+
 def _read(
     plan: Plan, source: Source, progress: Callable[[float], None]
 ) -> tuple[dict[str, F64], list[StreamUse]]:
@@ -141,7 +145,11 @@ def _read(
                 f"[[{name}]] stream: expected one of the recording, which has {has}; "
                 f"got {item.stream!r}"
             )
-        rows = read_rows(plan, item, source.records(list(matched)), matched)
+        seen = set[str]()
+        rows = read_rows(plan, item, _noted(source.records(list(matched)), seen), matched)
+        for stream in matched:
+            if stream not in seen:
+                raise UsageError(f"[[{name}]] {stream}: expected rows, found none")
         used.append(StreamUse(name, tuple(matched), len(rows.values), rows.left_out))
         if len(rows.values):
             parts.setdefault(name, []).append(rows.values)

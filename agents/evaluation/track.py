@@ -153,8 +153,12 @@ def track_log(
 
     Raises:
         LogError: The folder cannot be read, or estimates would be wrong (`refuse_errors`).
-        ConfigError: The filter does not exist or cannot smooth.
+        ConfigError: The filter does not exist or cannot smooth, or an argument is out of range.
     """
+    if smooth not in (None, "lag", "all"):
+        raise ConfigError(f"smooth: expected None, 'lag' or 'all', got {smooth!r}")
+    if not 0.0 <= skip < float("inf"):
+        raise ConfigError(f"skip: expected 0 or more seconds, got {skip!r}")
     log = log if isinstance(log, Log) else read_log(log)
     if findings is None:
         log, findings = examine(log)

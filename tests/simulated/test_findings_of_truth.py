@@ -7,6 +7,7 @@ import pytest
 
 from agents.simulation.simulate import simulate
 from tracking.findings.truth import find_truth_errors
+from tracking.measurements import Kind
 
 
 @pytest.fixture(scope="module", params=["cars-los", "human", "swarm-nlos"])
@@ -32,6 +33,16 @@ def test_truth_of_other_nodes_is_a_finding(log):
     (found,) = find_truth_errors(replace(log, truth=replace(log.truth, node=exchanged)))
     assert found.name == "truth-nodes"
     assert found.nodes == tuple(log.constellation.ids[n] for n in (0, 2))
+
+
+@pytest.mark.parametrize("factor", [1.1, 0.9, 3.281, 1000.0])
+def test_a_factor_between_ranges_and_truth_is_a_finding(log, factor):
+    block = log.block
+    values, ranges = block.values.copy(), block.kind[0] == Kind.RANGE
+    values[0, ranges, 0] *= factor
+    wrong = replace(log, block=replace(block, values=values))
+    (found,) = find_truth_errors(wrong)
+    assert (found.name, found.severity) == ("truth-scale", "warning")
 
 
 def test_nodes_without_truth_are_no_finding(log):

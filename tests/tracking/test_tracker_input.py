@@ -9,6 +9,7 @@ from tracking import Constellation, NodeConfig, Tracker
 from tracking.ahrs.params import OrientationParams
 from tracking.constellation import Antenna
 from tracking.errors import ConfigError
+from tracking.estimate import TeamEstimate
 from tracking.filters.joint.params import JointParams
 from tracking.filters.pair.params import PairEkfParams
 from tracking.late_data.horizon import Horizon, HorizonParams
@@ -240,3 +241,24 @@ def test_what_is_printed_is_short():
     estimate = Tracker(group).run(block, np.linspace(0.1, 3.0, 500))
     assert len(repr(block)) < 400
     assert len(repr(estimate)) < 600
+
+
+def test_what_is_no_constellation_is_named():
+    for wrong in (3, [], [NodeConfig(id=1)]):
+        with pytest.raises(ConfigError, match="constellation: expected a Constellation, got"):
+            Tracker(wrong)
+
+
+@pytest.mark.parametrize("pair", [(0, 5), (-1, 0), (0, 1.0), ("1", "2"), (True, 0)])
+def test_nodes_of_an_estimate_that_are_no_indices_are_named(pair):
+    who = Constellation(nodes=tuple(NodeConfig(id=k) for k in (7, 8, 9)))
+    estimate = TeamEstimate.empty(who, np.zeros(1))
+    for method in (estimate.between, estimate.between_b, estimate.relative_orientation):
+        with pytest.raises(ConfigError, match="expected node indices 0 to 2, got"):
+            method(*pair)
+
+
+@pytest.mark.parametrize("wrong", [-1, "a", 1.5])
+def test_ids_that_are_no_whole_numbers_are_named(wrong):
+    with pytest.raises(ConfigError, match="nodes.id: expected 0 or more, got"):
+        Constellation(nodes=(NodeConfig(id=wrong), NodeConfig(id=1)))

@@ -122,6 +122,11 @@ KINDS: dict[str, Kind] = {
         "ranges fit better if the truth of two nodes is exchanged",
         "correct the ids in truth.csv",
     ),
+    "truth-scale": Kind(
+        "warning",
+        "ranges and true distances differ by a factor",
+        "`relpos calibrate uwb`, or correct the unit of ranges.csv or truth.csv",
+    ),
     "ranges-refused": Kind(
         "warning",
         "the filter refused many ranges as outliers: they are worse than it assumes",

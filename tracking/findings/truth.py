@@ -1,4 +1,4 @@
-"""Truth against measured ranges: its clock, and which node is which."""
+"""Truth against measured ranges: its clock, its unit, and which node is which."""
 
 from __future__ import annotations
 
@@ -20,12 +20,16 @@ FEWEST = 20
 """[-] Least number of ranges of a pair with truth."""
 LARGEST = 2.0
 """[m] Limit of the residual of a range, for outliers."""
+LEAST_FACTOR = 0.08
+"""[-] Relative error of a factor that is reported; multipath makes up to 0.07 of recordings."""
+LEAST_SPREAD, TRIMS = 0.3, 4
+"""[-] Least range of true distances over the largest, to know a factor; rounds without outliers."""
 CLEARLY = 0.8
 """[-] Residuals over those of the truth as it is, below which another fits clearly better."""
 
 
 def find_truth_errors(log: Log) -> list[Finding]:
-    """Find a truth that is on another clock than the ranges, or of other nodes."""
+    """Find a truth that is on another clock than the ranges, of other nodes, or scaled."""
     truth, t = log.truth, log.block.t[0]
     moving = ~log.constellation.is_static
     times = truth.t[truth.valid & moving[truth.node]]
@@ -37,7 +41,7 @@ def find_truth_errors(log: Log) -> list[Finding]:
             f"{t.min():.1f} to {t.max():.1f} s: no time in common, so nothing is scored"
         )
         return [Finding("truth-clock", (), text)]
-    return _late(log) or _exchanged(log)
+    return _late(log) or _exchanged(log) or _scaled(log)
 
 
 def _late(log: Log) -> list[Finding]:
@@ -72,37 +76,59 @@ def _exchanged(log: Log) -> list[Finding]:
     return found
 
 
-def _residuals(log: Log, shift: float = 0.0) -> tuple[F64, I64]:
-    """Return ranges less true distances, and the number of their pair.
+def _scaled(log: Log) -> list[Finding]:
+    """Find a factor between ranges and true distances; an offset has no part in it."""
+    off, _, metres = _residuals(log)
+    known = np.isfinite(off)
+    distance, metres = (metres - off)[known], metres[known]
+    if len(metres) < FEWEST or np.ptp(distance) < LEAST_SPREAD * distance.max():
+        return []
+    fits = np.ones(len(metres), dtype=bool)
+    for _ in range(TRIMS):
+        slope, intercept = np.polyfit(distance[fits], metres[fits], 1)
+        rest = np.abs(metres - slope * distance - intercept)
+        fits = rest <= 3.0 * np.median(rest)
+    if abs(slope - 1.0) <= LEAST_FACTOR:
+        return []
+    text = (
+        f"ranges grow by {slope:.3g} m for a metre of true distance, expected 1: they are long or "
+        "short by a factor, or one of both is in another unit"
+    )
+    return [Finding("truth-scale", (), text)]
+
+
+def _residuals(log: Log, shift: float = 0.0) -> tuple[F64, I64, F64]:
+    """Return ranges less true distances, the number of their pair, and the ranges.
 
     Args:
         log: A recording with truth.
         shift: Delay of the truth [s].
 
     Returns:
-        Residuals, NaN without truth, (range) [m]; numbers of the pairs, (range).
+        Residuals, NaN without truth, (range) [m]; numbers of the pairs, (range); ranges [m].
     """
     block = log.block
     rows = np.flatnonzero((block.kind[0] == Kind.RANGE) & block.valid[0])
     rows = rows[:: max(len(rows) // MOST_RANGES, 1)]
     pos, known = log.truth.positions(log.constellation, block.t[0, rows] + shift)
     i, j, k = block.i[0, rows], block.j[0, rows], np.arange(len(rows))
-    off = block.values[0, rows, 0] - np.linalg.norm(pos[k, i] - pos[k, j], axis=-1)
+    metres = block.values[0, rows, 0]
+    off = metres - np.linalg.norm(pos[k, i] - pos[k, j], axis=-1)
     off[~(known[k, i] & known[k, j])] = np.nan
-    return off, i * log.constellation.n_nodes + j
+    return off, i * log.constellation.n_nodes + j, metres
 
 
-def _scatter(residuals: tuple[F64, I64]) -> float:
+def _scatter(residuals: tuple[F64, I64, F64]) -> float:
     """Return the median absolute deviation of ranges from the median of their pair [m]."""
-    off, pair = (of[np.isfinite(residuals[0])] for of in residuals)
+    off, pair = (of[np.isfinite(residuals[0])] for of in residuals[:2])
     of_pairs = [off[pair == p] for p in np.unique(pair)]
     rest = [np.abs(of - np.median(of)) for of in of_pairs if len(of) >= FEWEST]
     return float(np.median(np.concatenate(rest))) if rest else np.nan
 
 
-def _distances(*residuals: tuple[F64, I64]) -> F64:
+def _distances(*residuals: tuple[F64, I64, F64]) -> F64:
     """Return mean absolute residuals of the ranges that all have, at most `LARGEST` each [m]."""
-    off = np.array([of for of, _ in residuals])
+    off = np.array([of[0] for of in residuals])
     off = off[:, np.isfinite(off).all(axis=0)]
     if off.shape[1] < FEWEST:
         return np.full(len(off), np.nan)

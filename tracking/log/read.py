@@ -228,7 +228,12 @@ def _read_members(folder: Path, constellation: Constellation) -> list[Measuremen
     table = Table.read(path, ("t_s", "node", "joins"))
     t, node = table.times(), table.nodes("node", constellation.index_of)
     joins, filled = table.numbers(("joins",))
-    table.check_share(filled[:, 0] & np.isin(joins[:, 0], (0.0, 1.0)), "0 or 1", ("joins",))
+    wrong = np.flatnonzero(~(filled[:, 0] & np.isin(joins[:, 0], (0.0, 1.0))))
+    if len(wrong):
+        raise LogError(
+            f"{path.name} row {wrong[0] + 2}, joins: expected 0 or 1, "
+            f"found {table.text('joins')[wrong[0]]!r}"
+        )
     none = np.zeros((table.n_rows, 1))
     return [
         MeasurementBlock.of_kind(kind, t[of], node[of], none[of])
@@ -241,6 +246,8 @@ def _read_truth(folder: Path, constellation: Constellation, skipped: dict[str, i
     if path is None:
         return Truth.empty()
     table = Table.read(path, ("t_s", "node", "x", "y", "z", *QUAT))
+    if table.n_rows == 0:
+        raise LogError(f"{path.name}: no rows, expected true positions or no such file")
     t, node = table.times(), table.nodes("node", constellation.index_of)
     pos, filled = table.numbers(("x", "y", "z"))
     good = _within(pos, filled, np.full(3, MAX_POSITION))
