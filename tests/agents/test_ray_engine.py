@@ -218,5 +218,5 @@ def test_an_address_where_nobody_answers_is_refused():
 
 def test_without_ray_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(UsageError, match=r"needs ray: pip install 'relpos-env\[ray\]'"):
+    with pytest.raises(UsageError, match=r"needs ray: pip install -e '\.\[ray\]'"):
         list(find_engine("ray")(divided, [(1.0, 1.0)], 1))

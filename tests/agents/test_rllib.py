@@ -1,4 +1,4 @@
-"""Environment and training of RLlib; they need relpos-env[rllib]."""
+"""Environment and training of RLlib; they need the extra `rllib`."""
 
 import json
 import pickle

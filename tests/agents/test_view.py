@@ -86,7 +86,7 @@ def test_a_file_has_what_was_shown(tmp_path):
 
 def test_what_cannot_be_opened(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(UsageError, match=r"pip install 'relpos-env\[view\]'"):
+    with pytest.raises(UsageError, match=r"pip install -e '\.\[view\]'"):
         open_viewer("none", tmp_path / "a.rrd")
     monkeypatch.undo()
     pytest.importorskip("rerun")

@@ -245,11 +245,11 @@ def test_what_a_log_has_no_place_for_is_left_out_and_counted(block, tmp_path):
     odd = MeasurementBlock.concatenate(
         [
             block,
-            of_kind(Kind.RANGE, [101.0] * 4, 0, [[0.0], [301.0], [nan], [-1.0]], j=1),
+            of_kind(Kind.RANGE, [101.0] * 4, 0, [[0.0], [1001.0], [nan], [-1.0]], j=1),
             of_kind(Kind.RANGE, [nan], 0, [[1.0]], j=1),
             of_kind(Kind.RANGE, [101.0], 1, [[1.0]], j=1),
             of_kind(Kind.SURVEY, [101.0], 0, [[1.0]], j=2),
-            of_kind(Kind.IMU, [101.0] * 3, [0, 0, 2], [[nan] * 6, [0, 0, 90, 0, 0, 0], [0] * 6]),
+            of_kind(Kind.IMU, [101.0] * 3, [0, 0, 2], [[nan] * 6, [0, 0, 5000, 0, 0, 0], [0] * 6]),
             of_kind(Kind.STATE, [101.0], 1, [[0.5, 0, 0, 0, 0, 0, 0]]),
             of_kind(Kind.JOIN, [99.0], 0, [[0.0]]),
             of_kind(Kind.LEAVE, [200.0], 0, [[0.0]]),

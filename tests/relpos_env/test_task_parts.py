@@ -78,7 +78,7 @@ BAD = [
     ("hold", {"spacing": -1.0}, "spacing"),
     ("hold", {"spacing": 50.0}, "spacing"),
     ("hold", {"heading": np.nan}, "heading"),
-    ("hold", {"speed": 1.0}, "speed"),
+    ("hold", {"speed": 1.0}, "task_options"),
     ("travel", {"speed": 0.0}, "speed"),
     ("travel", {"speed": "fast"}, "speed"),
     ("travel", {"path": "spiral"}, "path"),
