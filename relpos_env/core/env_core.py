@@ -26,7 +26,7 @@ from relpos_env.interface.observations.base import F32
 from relpos_env.interface.views import reveal
 from relpos_env.scenarios.episode import draw_episode
 from relpos_env.sensors.operator import Operator
-from relpos_env.tasks import TASKS, reward_weights
+from relpos_env.tasks import TASKS, DrivingTask, InformedTask, reward_weights
 from relpos_env.timing import DECISION, DT, STAND_STILL
 from relpos_env.world.world import Physics, World
 from relpos_env.world.world_state import WorldState
@@ -77,8 +77,8 @@ class EnvCore:
             physics=physics,
         )
         self.task = parts.make_task(n_envs)
-        operator = replace(config.operator, gain=0.0) if self.task.drives else config.operator
-        self.operator = Operator(operator, n, n_envs)
+        gain = 0.0 if isinstance(self.task, DrivingTask) else config.operator.gain
+        self.operator = Operator(replace(config.operator, gain=gain), n, n_envs)
         self._is_own_task = not (isinstance(config.task, str) and config.task in TASKS)
         self.weights = reward_weights(config.task, self.task, config.weights)
         self._size = total_size(parts.mode.fields)
@@ -149,7 +149,7 @@ class EnvCore:
         if options.goals is not None:
             cars = np.flatnonzero(self.state.present[env])
             self.task.set_goals(env, options.goals, cars)
-        if self.task.drives:
+        if isinstance(self.task, DrivingTask):
             self.task.plan_drive(env, rng.spawn(1)[0])
         self.operator.reset(seed, here)
         self.cycles[env] = 0
@@ -169,7 +169,7 @@ class EnvCore:
         """
         if self.gate is not None:
             speed, steering = self.gate.allow(self.loop.view, speed, steering)
-        if self.task.drives:
+        if isinstance(self.task, DrivingTask):
             speed, steering = speed.copy(), steering.copy()
             self.task.drive(self.state, self.t, speed, steering)
         if self._pool is None:
@@ -233,7 +233,7 @@ class EnvCore:
     def _judge(self, envs: slice) -> None:
         """Update task, operator and outcome with the current state."""
         self.task.update(self.state, self.t, self.loop.swarm.contacts, envs)
-        if self.task.reads_estimates:
+        if isinstance(self.task, InformedTask):
             self.task.inform(self.loop.view.cov, self.loop.view.ok, envs)
         self.operator.sample(self.state, self.task, envs)
         if envs.stop - envs.start == self.n_envs:

@@ -8,7 +8,7 @@ from typing import Any
 
 from relpos_env.errors import EnvError
 from relpos_env.registry import build, look_up
-from relpos_env.tasks.base import Task, Truth
+from relpos_env.tasks.base import DrivingTask, InformedTask, Task, Truth
 from relpos_env.tasks.escort import Escort
 from relpos_env.tasks.follow import follow
 from relpos_env.tasks.gap import Gap
@@ -79,6 +79,8 @@ _ALWAYS = ("n_cars", "n_envs", "room")
 __all__ = [
     "DEFAULT_WEIGHTS",
     "TASKS",
+    "DrivingTask",
+    "InformedTask",
     "Task",
     "Truth",
     "make_task",

@@ -65,11 +65,6 @@ class Task(ABC):
     default_weights: Mapping[str, float] = MappingProxyType({})
     """Weights of reward terms that are not 1; those of built-in tasks are `DEFAULT_WEIGHTS`."""
 
-    drives: bool = False
-    """True if the task drives a car itself (`plan_drive`, `drive`), without an operator."""
-    reads_estimates: bool = False
-    """True if rewards depend on the estimates of the cars (`inform`)."""
-
     def __init__(self, n_cars: int, n_envs: int, terms: tuple[str, ...]) -> None:
         """Allocate the arrays.
 
@@ -157,31 +152,6 @@ class Task(ABC):
         """
         raise EnvError("goals: expected none, the task has places of its own")
 
-    def plan_drive(self, env: int, rng: np.random.Generator) -> None:
-        """Draw the drive of an episode, for tasks that drive a car."""
-        raise NotImplementedError
-
-    def drive(self, state: Pose, t: F64, speed: F64, steering: F64) -> None:
-        """Replace the commands of the cars that the task drives.
-
-        Args:
-            state: True state of all environments.
-            t: Time since the start of the episode, (env) [s].
-            speed: Commanded speeds, (env, car) [m/s], updated.
-            steering: Commanded steering angles, (env, car) [rad], updated.
-        """
-        raise NotImplementedError
-
-    def inform(self, cov: F64, ok: Bool, envs: slice) -> None:
-        """Write the reward terms that depend on estimates, for tasks that read them.
-
-        Args:
-            cov: Covariances xx, yy, xy of relative positions, (env, car, other, 3) [m2].
-            ok: True for usable estimates, (env, car, other).
-            envs: Environments to update, contiguous.
-        """
-        raise NotImplementedError
-
     @abstractmethod
     def begin(self, env: int, pos: F64, cars: I64) -> None:
         """Assign slots at the start of an episode.
@@ -220,3 +190,36 @@ class Task(ABC):
         if step != 1:
             raise EnvError(f"envs: expected a contiguous slice, got {envs}")
         return start, stop
+
+
+class DrivingTask(Task):
+    """A task that drives a car itself; its rooms have no operator."""
+
+    @abstractmethod
+    def plan_drive(self, env: int, rng: np.random.Generator) -> None:
+        """Draw the drive of an episode."""
+
+    @abstractmethod
+    def drive(self, state: Pose, t: F64, speed: F64, steering: F64) -> None:
+        """Replace the commands of the cars that the task drives.
+
+        Args:
+            state: True state of all environments.
+            t: Time since the start of the episode, (env) [s].
+            speed: Commanded speeds, (env, car) [m/s], updated.
+            steering: Commanded steering angles, (env, car) [rad], updated.
+        """
+
+
+class InformedTask(Task):
+    """A task with rewards that depend on the estimates of the cars."""
+
+    @abstractmethod
+    def inform(self, cov: F64, ok: Bool, envs: slice) -> None:
+        """Write these reward terms.
+
+        Args:
+            cov: Covariances xx, yy, xy of relative positions, (env, car, other, 3) [m2].
+            ok: True for usable estimates, (env, car, other).
+            envs: Environments to update, contiguous.
+        """

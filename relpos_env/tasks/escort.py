@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from relpos_env.errors import EnvError
-from relpos_env.tasks.base import COMMON_TERMS, Pose, Task, Truth
+from relpos_env.tasks.base import COMMON_TERMS, DrivingTask, Pose, Truth
 from relpos_env.tasks.geometry.assignment import assign
 from relpos_env.tasks.geometry.shapes import MAX_SPACING, MIN_SPACING
 from relpos_env.tasks.kernels.escort import update_escort, wander
@@ -23,14 +23,12 @@ GAIN, MOST_STEERING = 1.5, 0.4
 """[-], [rad] Steering per heading error, and its limit."""
 
 
-class Escort(Task):
+class Escort(DrivingTask):
     """Slots round the first present car, which drives to random waypoints by itself.
 
     Its actions have no effect. The frame does not turn, so targets are constant, and no reference
     velocity says where the escorted car will drive.
     """
-
-    drives = True
 
     def __init__(
         self,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from relpos_env.tasks.base import InformedTask
 from relpos_env.tasks.geometry.shapes import Formation
 from relpos_env.tasks.moving import Motion, MovingFormation
 from relpos_env.tasks.travel import plan_travel
@@ -29,10 +30,8 @@ def information_of(cov: F64, ok: Bool, present: Bool) -> F64:
     return np.asarray(gain.sum(axis=-1) / np.maximum(both.sum(axis=-1), 1))
 
 
-class Observe(MovingFormation):
+class Observe(InformedTask, MovingFormation):
     """A formation that follows a path, rewarded for small expected errors of its estimates."""
-
-    reads_estimates = True
 
     def __init__(self, n_cars: int, n_envs: int, formation: Formation, motion: Motion) -> None:
         """Combine a formation and a motion, see `MovingFormation`."""

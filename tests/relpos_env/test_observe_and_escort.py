@@ -1,4 +1,4 @@
-"""Tasks that need the tracker: rewards for certain estimates, and a car that nobody plans."""
+"""Tasks that need the tracker: rewards for certain estimates, and a car that drives by itself."""
 
 import numpy as np
 import pytest

@@ -147,7 +147,7 @@ def test_the_plan_knows_nothing_of_the_truth(name):
     state = rooms(2, 4, seed=2)
     task = begun(name, state)
     update(task, state, 3.0)
-    # In `escort` goals are relative to a car that nobody plans; policies do not observe goals.
+    # In `escort` goals are relative to a car without a plan; policies do not observe goals.
     known = [task.plan, task.target, *([task.goal_w] if name != "escort" else [])]
     kept = [a.copy() for a in known]
     other = rooms(2, 4, seed=9)
