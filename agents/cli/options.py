@@ -32,7 +32,7 @@ task_option = click.option(
     "--task",
     default="ring",
     show_default=True,
-    help="Task: ring, hold, travel, gap, rendezvous, follow, observe or escort.",
+    help="Task: ring, hold, travel, gap, rendezvous, follow, observe, escort, seek or inspect.",
 )
 policy_option = click.option(
     "--policy",

@@ -19,7 +19,7 @@ from relpos_env.interface._info_kernels import write_figures
 from relpos_env.interface.infos import Columns, car_columns, make_figures
 from relpos_env.interface.observations import ObservationMode, total_size
 from relpos_env.interface.observations.base import F32
-from relpos_env.tasks import make_task, reward_weights
+from relpos_env.tasks import InformedTask, make_task, reward_weights
 from relpos_env.timing import DECISION
 from tracking.arrays import F64, Bool
 
@@ -175,6 +175,8 @@ class LiveGroup:
             self._begun = self.cycles
         now = np.array([(self.cycles - self._begun) * DECISION])
         task.update(estimated, now, self._no_cars, here)
+        if isinstance(task, InformedTask):
+            task.inform(swarm.view.cov, swarm.view.ok, here)
         self._ask()
         self.rewards[0] = np.where(estimated.present[0], task.rewards[0] @ self._weights, 0.0)
         self.terminated[:] = task.done

@@ -99,6 +99,8 @@ class RelposTask(Task):  # type: ignore[misc]
     FOLLOW = None
     OBSERVE = None
     ESCORT = None
+    SEEK = None
+    INSPECT = None
 
     @staticmethod
     def associated_class() -> type[RelposClass]:

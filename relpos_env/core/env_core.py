@@ -77,7 +77,9 @@ class EnvCore:
             physics=physics,
         )
         self.task = parts.make_task(n_envs)
-        gain = 0.0 if isinstance(self.task, DrivingTask) else config.operator.gain
+        gain = config.operator.gain
+        if isinstance(self.task, DrivingTask):
+            gain, self.loop.has_samples[:] = 0.0, self.task.has_samples
         self.operator = Operator(replace(config.operator, gain=gain), n, n_envs)
         self._is_own_task = not (isinstance(config.task, str) and config.task in TASKS)
         self.weights = reward_weights(config.task, self.task, config.weights)

@@ -23,7 +23,7 @@ from tracking.arrays import F64, Bool
 from tracking.estimate import TeamEstimate
 from tracking.filters import FilterBuilder
 from tracking.late_data.horizon import HorizonParams
-from tracking.measurements import MeasurementBlock
+from tracking.measurements import Kind, MeasurementBlock
 from tracking.ranging.compiled.overheard import Overheard
 from tracking.ranging.frames.airtime import round_rate
 from tracking.tracker import TrackerParams
@@ -81,6 +81,8 @@ class TrackedWorld:
             swarm.constellation, params, *self._inputs(), filter=filter, room=room,
             n_rangefinders=proximity,
         )  # fmt: skip
+        self.has_samples: Bool = np.ones(n_cars, dtype=bool)
+        """False for cars without inertial sensors and magnetometer, (car)."""
         self._singles: dict[int, TrackedWorld] = {}
 
     @property
@@ -101,6 +103,7 @@ class TrackedWorld:
         part = TrackedWorld.__new__(TrackedWorld)  # a copy would bind all kernels, 2 ms
         part.swarm = self.swarm.part(envs)
         part.perception = self.perception.part(envs, *part._inputs())
+        part.has_samples = self.has_samples
         part._singles = {}
         return part
 
@@ -166,6 +169,10 @@ class TrackedWorld:
         view.speed[:] = swarm.odometer
         view.steering[:] = state.steering
         view.near[:] = swarm.proximity
+        if not self.has_samples.all():
+            block = swarm.block
+            is_sample = (block.kind == Kind.IMU) | (block.kind == Kind.MAG)
+            block.valid[is_sample & ~self.has_samples[block.i]] = False
         self.perception.step()
 
     def _inputs(self) -> tuple[MeasurementBlock, Bool, Overheard]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
+from inspect import signature
 from typing import Any
 
 from relpos_env.errors import EnvError
@@ -13,9 +13,11 @@ from relpos_env.tasks.escort import Escort
 from relpos_env.tasks.follow import follow
 from relpos_env.tasks.gap import Gap
 from relpos_env.tasks.hold import hold
+from relpos_env.tasks.inspect import Inspect
 from relpos_env.tasks.observe import observe
 from relpos_env.tasks.rendezvous import Rendezvous
 from relpos_env.tasks.ring import Ring
+from relpos_env.tasks.seek import Seek
 from relpos_env.tasks.travel import travel
 from relpos_env.tasks.weights import DEFAULT_WEIGHTS, reward_weights
 
@@ -30,6 +32,8 @@ TASKS: dict[str, TaskBuilder] = {
     "follow": follow,
     "observe": observe,
     "escort": Escort,
+    "seek": Seek,
+    "inspect": Inspect,
 }
 """Name to builder ``(n_cars, n_envs, room, **options) -> Task``. A new task needs a file, a line
 here, and its weights in `DEFAULT_WEIGHTS`."""
@@ -64,7 +68,7 @@ def make_task(
         EnvError: Unknown task, unknown option, or an option out of range.
     """
     builder = task_builder(name)
-    known = [p for p in inspect.signature(builder).parameters if p not in _ALWAYS]
+    known = [p for p in signature(builder).parameters if p not in _ALWAYS]
     for option in options:
         if option not in known:
             raise EnvError(

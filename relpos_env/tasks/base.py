@@ -195,6 +195,9 @@ class Task(ABC):
 class DrivingTask(Task):
     """A task that drives a car itself; its rooms have no operator."""
 
+    has_samples: Bool
+    """False for cars without inertial sensors and magnetometer, (car)."""
+
     @abstractmethod
     def plan_drive(self, env: int, rng: np.random.Generator) -> None:
         """Draw the drive of an episode."""

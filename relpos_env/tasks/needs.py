@@ -17,6 +17,8 @@ DEFAULT_SCENARIO: Mapping[str, str] = {
     "follow": "hall",
     "observe": "hall",
     "escort": "open",
+    "seek": "open",
+    "inspect": "hall",
 }
 """Task to its default scenario."""
 

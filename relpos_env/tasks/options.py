@@ -28,6 +28,18 @@ def not_negative(name: str, value: float) -> float:
     return _number(name, value, "a finite number of at least 0", low=0.0, strict=False)
 
 
+def share(name: str, value: float) -> float:
+    """Return the value, checked to be more than 0 and at most 1.
+
+    Raises:
+        EnvError: The value is out of range.
+    """
+    number = positive(name, value)
+    if number > 1.0:
+        raise EnvError(f"{name}: expected a share of at most 1, got {value!r}")
+    return number
+
+
 def finite(name: str, value: float) -> float:
     """Return the value, checked to be finite.
 

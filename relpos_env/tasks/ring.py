@@ -27,6 +27,9 @@ SHARE = 0.28
 class Ring(Task):
     """Evenly spaced slots that move counter-clockwise on a loop round the room; never ends."""
 
+    _more_terms: tuple[str, ...] = ()
+    """Reward terms of a subclass, after the others."""
+
     def __init__(
         self,
         n_cars: int,
@@ -51,7 +54,9 @@ class Ring(Task):
         Raises:
             EnvError: An option is out of range, or the cars do not fit on the ring.
         """
-        super().__init__(n_cars, n_envs, ("formation", "velocity", *COMMON_TERMS))
+        super().__init__(
+            n_cars, n_envs, ("formation", "velocity", *COMMON_TERMS, *self._more_terms)
+        )
         half = half_room(room, 0.0)
         axes = _half_axes(half_axes, half)
         self._curve = loop(*axes)

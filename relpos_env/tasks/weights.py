@@ -31,6 +31,8 @@ DEFAULT_WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "follow": {**_MOVING, "time": 1.2},
         "observe": {**_MOVING, "information": 1.0, "time": 1.2},
         "escort": _MOVING,
+        "seek": _MOVING,
+        "inspect": {"formation": 0.2, "velocity": 0.1, **_CARE, "time": 0.5, "coverage": 100.0},
         "gap": _ENDING,
         "rendezvous": _ENDING,
     }

@@ -50,7 +50,8 @@ WHY = "which has its own cars and task; they drive one after the other"
     multiple=True,
     default=("ring",),
     show_default=True,
-    help="Task: ring, hold, travel, gap, rendezvous, follow, observe or escort; repeatable.",
+    help="Task: ring, hold, travel, gap, rendezvous, follow, observe, escort, seek or inspect; "
+    "repeatable.",
 )
 @cars_option
 @click.option(

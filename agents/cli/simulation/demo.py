@@ -18,7 +18,8 @@ from agents.errors import UsageError
 @scenario_option("; by default that of the policy or of the task.")
 @click.option(
     "--task",
-    help="Task: ring, hold, travel, gap, rendezvous, follow, observe or escort.  [default: that "
+    help="Task: ring, hold, travel, gap, rendezvous, follow, observe, escort, seek or inspect.  "
+    "[default: that "
     "of the policy, or ring]",
 )
 @click.option("--seconds", default=60.0, show_default=True, help="Length, 15 to 3600 [s].")
