@@ -14,6 +14,7 @@ import torch
 from benchmarl.algorithms import IppoConfig, MappoConfig, MasacConfig, QmixConfig
 from benchmarl.environments import task_config_registry
 from benchmarl.experiment import Experiment, ExperimentConfig
+from benchmarl.models import GruConfig
 from benchmarl.models.mlp import MlpConfig
 
 from relpos_env.api.benchmarl_tasks import CONF, RelposTask, register
@@ -72,22 +73,35 @@ def test_the_seed_is_that_of_the_other_forms():
     assert torch.equal(first[1], other[0])
 
 
-@pytest.mark.parametrize("algorithm", [MappoConfig, IppoConfig, QmixConfig, MasacConfig])
-def test_algorithms_learn(algorithm, tmp_path):
+def experiment_of(algorithm, model, folder):
     config = ExperimentConfig.get_from_yaml()
     for name, value in SIZES.items():
         assert hasattr(config, name)
         setattr(config, name, value)
-    config.save_folder = str(tmp_path)
+    config.save_folder = str(folder)
     # Cars join and leave in this scenario.
-    experiment = Experiment(
+    return Experiment(
         task=task_of("hold", scenario="swarm-nlos"),
         algorithm_config=algorithm.get_from_yaml(),
-        model_config=MlpConfig.get_from_yaml(),
+        model_config=model.get_from_yaml(),
         critic_model_config=MlpConfig.get_from_yaml(),
         seed=0,
         config=config,
     )
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "model"),
+    [
+        (MappoConfig, MlpConfig),
+        (IppoConfig, MlpConfig),
+        (QmixConfig, MlpConfig),
+        (MasacConfig, MlpConfig),
+        (MappoConfig, GruConfig),
+    ],
+)
+def test_algorithms_learn(algorithm, model, tmp_path):
+    experiment = experiment_of(algorithm, model, tmp_path)
     before = [p.clone() for p in experiment.policy.parameters()]
     experiment.run()
     after = list(experiment.policy.parameters())
@@ -95,6 +109,16 @@ def test_algorithms_learn(algorithm, tmp_path):
     assert all(torch.isfinite(p).all() for p in after)
     (told,) = tmp_path.rglob("*.json")
     assert "relpos" in json.loads(told.read_text())
+
+
+@pytest.mark.parametrize(("algorithm", "is_central"), [(MappoConfig, True), (IppoConfig, False)])
+def test_critics_see_the_state_or_their_car_and_policies_never_the_state(
+    algorithm, is_central, tmp_path
+):
+    experiment = experiment_of(algorithm, MlpConfig, tmp_path)
+    (loss,) = experiment.losses.values()
+    assert ("state" in loss.critic_network.in_keys) == is_central
+    assert "state" not in loss.actor_network.in_keys
 
 
 def test_the_command_line_takes_tasks_and_levels(tmp_path):
