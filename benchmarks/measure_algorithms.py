@@ -89,8 +89,8 @@ def train(algorithm: str, task: str, seed: int, folder: Path) -> dict[str, Any]:
         with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
             return experiment.policy(seen)["agents", "action"].numpy()
 
-    (told,) = folder.rglob("*.json")
-    steps = next(iter(json.loads(told.read_text())["relpos"][task][algorithm].values()))
+    (written,) = folder.rglob("*.json")
+    steps = next(iter(json.loads(written.read_text())["relpos"][task][algorithm].values()))
     steps.pop("absolute_metrics", None)
     actions = "discrete" if algorithm == "qmix" else "continuous"
     return {"steps": steps, "training_s": round(trained), **drive(act, task, actions)}
@@ -165,10 +165,10 @@ def main() -> None:
         return
     jobs = int(sys.argv[1]) if len(sys.argv) == 2 else 2
     have = {(line["algorithm"], line["task"], line["seed"]) for line in measured()}
-    wanted = [(CONTROLLER, task, 0) for task in PROTOCOL["tasks"]]
-    wanted += [(a, t, s) for s, t, a in product(SEEDS, PROTOCOL["tasks"], ALGORITHMS)]
+    missing = [(CONTROLLER, task, 0) for task in PROTOCOL["tasks"]]
+    missing += [(a, t, s) for s, t, a in product(SEEDS, PROTOCOL["tasks"], ALGORITHMS)]
     with ThreadPoolExecutor(jobs) as pool:
-        list(pool.map(lambda one: run(*one), [one for one in wanted if one not in have]))
+        list(pool.map(lambda one: run(*one), [one for one in missing if one not in have]))
     write_marl_eval(measured())
 
 

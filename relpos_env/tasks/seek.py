@@ -9,7 +9,7 @@ class Seek(Escort):
     """Slots round a transponder that moves slowly, of which nothing but ranges is known.
 
     Car 0 carries it, without inertial sensors and magnetometer; while it is absent, the first
-    present car stands for it.
+    present car takes its place.
     """
 
     def __init__(
