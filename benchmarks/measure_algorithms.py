@@ -6,7 +6,7 @@ BenchMARL's defaults otherwise; none was tuned.
 
 Run `make build/benchmarl/.installed`, then `PYTHONPATH=build/benchmarl:. .venv/bin/python
 benchmarks/measure_algorithms.py [JOBS]`; two and a half hours on two cores. It adds what is missing
-in `benchmarks/results/algorithms.jsonl` and writes `algorithms.json` beside it, which marl-eval
+in `benchmarks/results/algorithms.jsonl` and writes `algorithms.json` with it, which marl-eval
 reads.
 """
 

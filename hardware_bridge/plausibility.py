@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass, fields
 from typing import TypeAlias
 
-from hardware_bridge.readings import ImuReading, StateReading, Vector
+from hardware_bridge.readings import ImuReading, PeerReading, StateReading, Vector
 
 NS = 1_000_000_000
 Place: TypeAlias = tuple[float, ...]
@@ -116,7 +116,7 @@ class Plausibility:
             or _wrong("field", reading.mag or (0.0, 0.0, 0.0), p.mag_scale * (1.0 + p.rounding))
         )
 
-    def allows_state(self, reading: StateReading) -> bool:
+    def allows_state(self, reading: StateReading | PeerReading) -> bool:
         """Return whether the quaternion is normalised and the acceleration within the scale."""
         p = self._params
         length = math.hypot(*reading.q_wb)

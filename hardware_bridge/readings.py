@@ -72,6 +72,22 @@ class StateReading(NamedTuple):
     """[m/s2] Acceleration without gravity, world frame."""
 
 
+class PeerReading(NamedTuple):
+    """Motion of another node, as the device computes it from the ranging messages of that node."""
+
+    source: Source
+    of: str
+    """The other device, written like `Source.device`."""
+    age: float
+    """[s] Age of the motion at the time of the source."""
+    q_wb: tuple[float, float, float, float]
+    """w x y z, body to world."""
+    accel_w: Vector
+    """[m/s2] Mean acceleration without gravity, world frame."""
+    noise: float = 0.0
+    """[m/s2/sqrt(Hz)] Noise density that adds to that of its accelerometer."""
+
+
 class RangeReading(NamedTuple):
     """A distance between two devices."""
 
@@ -205,6 +221,7 @@ class PoseReading(NamedTuple):
 Reading: TypeAlias = (
     ImuReading
     | StateReading
+    | PeerReading
     | RangeReading
     | MotionReading
     | NearReading

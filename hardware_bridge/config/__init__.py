@@ -1,5 +1,6 @@
 """swarm.toml: the nodes of the group, the ports and the permitted actions."""
 
+from hardware_bridge.config.alone import alone
 from hardware_bridge.config.read import parse_config, read_config
 from hardware_bridge.config.swarm import CarConfig, LinkConfig, SwarmConfig, TaskConfig
 
@@ -8,6 +9,7 @@ __all__ = [
     "LinkConfig",
     "SwarmConfig",
     "TaskConfig",
+    "alone",
     "parse_config",
     "read_config",
 ]

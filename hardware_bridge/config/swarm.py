@@ -106,6 +106,8 @@ class SwarmConfig:
     """Content of the file, for recordings."""
     uncalibrated_ranges: bool = False
     """True if ranges without calibration in the files may be used as received."""
+    alone: int | None = None
+    """Node of the only car that is driven, if its own computer decides for it alone."""
     marks: Path | None = None
     """File with the replay protection state of signed messages; None keeps no state."""
 

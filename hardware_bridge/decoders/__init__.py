@@ -25,6 +25,7 @@ from hardware_bridge.readings import (
     NearReading,
     OperatorReading,
     PairReading,
+    PeerReading,
     PoseReading,
     RangeReading,
     ScanReading,
@@ -68,6 +69,7 @@ DECODERS: dict[str, DecoderEntry] = {
         tells=(
             ImuReading,
             StateReading,
+            PeerReading,
             RangeReading,
             MotionReading,
             StatusReading,

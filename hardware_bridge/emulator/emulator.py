@@ -17,7 +17,7 @@ import numpy as np
 from hardware_bridge.emulator.devices import CarDevice, NodeDevice, OperatorDevice
 from hardware_bridge.emulator.fault_plan import CARS, LINKS, NODES, Fault, FaultPlan
 from hardware_bridge.emulator.line import Line
-from hardware_bridge.emulator.measured import by_node
+from hardware_bridge.emulator.measured import by_node, by_receiver
 from tracking.arrays import F64, Bool
 from tracking.measurements import MeasurementBlock
 
@@ -54,6 +54,12 @@ class World(Protocol):
 
         Returns:
             Measurements of one environment.
+        """
+
+    def known(self) -> MeasurementBlock | None:
+        """Return what each node knows from its radio, (node, event), see `by_receiver`.
+
+        None if a range is known to the node that resolves it, and the motion of others is not.
         """
 
     def motion(self) -> tuple[F64, F64]:
@@ -125,10 +131,11 @@ class Emulator:
             commanded = car.listen(world.t, t_ns)
             self._speed[k], self._steering[k] = (0.0, 0.0) if world.at_rest else commanded
         block = world.step(self._speed, self._steering)
-        t, powered = world.t, world.powered
-        for k, (device, rows) in enumerate(
-            zip(self.nodes, by_node(block, len(self.nodes)), strict=True)
-        ):
+        t, powered, known = world.t, world.powered, world.known()
+        measured = by_node(block, len(self.nodes))
+        if known is not None:
+            measured = by_receiver(measured, known)
+        for k, (device, rows) in enumerate(zip(self.nodes, measured, strict=True)):
             device.step(t, t_ns, rows, bool(powered[k]))
         for car, speed, steering, near in zip(
             self.cars, *world.motion(), world.near(), strict=True

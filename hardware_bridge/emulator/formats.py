@@ -14,6 +14,7 @@ from hardware_bridge.readings import (
     DeviceClock,
     HeartbeatReading,
     ImuReading,
+    PeerReading,
     RangeReading,
     Reading,
     StateReading,
@@ -21,7 +22,9 @@ from hardware_bridge.readings import (
 )
 from hardware_bridge.wire.encoder import RelposEncoder
 
-EVERYTHING = frozenset({ImuReading, StateReading, RangeReading, StatusReading, HeartbeatReading})
+EVERYTHING = frozenset(
+    {ImuReading, StateReading, PeerReading, RangeReading, StatusReading, HeartbeatReading}
+)
 RANGES: frozenset[type] = frozenset({RangeReading})
 IMUS: frozenset[type] = frozenset({ImuReading})
 

@@ -18,13 +18,14 @@ from hardware_bridge.emulator.node_clock import NodeClock
 from hardware_bridge.readings import (
     HeartbeatReading,
     ImuReading,
+    PeerReading,
     RangeReading,
     Reading,
     Source,
     StateReading,
     StatusReading,
 )
-from tracking.measurements import Kind
+from tracking.measurements import ACCEL_NOISE, Kind
 
 GRAVITY = 9.81
 """[m/s2] Specific force of a duplicate at rest."""
@@ -69,7 +70,7 @@ class EmulatedNode:
             params: Parameters of all nodes.
         """
         self.node, self.formats, self.params = node, tuple(formats), params
-        self._ids = tuple(ids)
+        self._ids, self._index = tuple(ids), tuple(ids).index(node)
         self.clock = NodeClock(
             float(rng.uniform(0.0, params.most_offset)),
             1e-6 * params.drift_ppm * float(rng.standard_normal()),
@@ -87,9 +88,9 @@ class EmulatedNode:
         """
         sent: list[list[bytes]] = [[] for _ in self.formats]
         for row in rows:
-            reading = self._reading(row)
+            reading = self._reading(row, t)
             if reading is not None and row.t >= self._silent_until:
-                self._send(sent, reading, row.t)
+                self._send(sent, reading, t if isinstance(reading, PeerReading) else row.t)
         if t >= max(self._silent_until, self._next_status):
             self._next_status = t + self.params.status_every
             self._send(sent, HeartbeatReading(Source()), t)
@@ -120,18 +121,23 @@ class EmulatedNode:
         self._mag: tuple[float, float, float] | None = None
         self._sample: ImuReading | None = None
 
-    def _reading(self, row: Measured) -> Reading | None:
+    def _reading(self, row: Measured, t: float) -> Reading | None:
         """Return a row in SI units; magnetometer values are added to the next IMU sample."""
         v, unnamed = row.values, Source()
         if row.kind is Kind.MAG:
             self._mag = v[0], v[1], v[2]
             return None
         if row.kind is Kind.STATE:
-            return StateReading(unnamed, (v[0], v[1], v[2], v[3]), (v[4], v[5], v[6]))
+            q, accel = (v[0], v[1], v[2], v[3]), (v[4], v[5], v[6])
+            if row.node != self._index:
+                of = str(self._ids[row.node])
+                return PeerReading(unnamed, of, t - row.t, q, accel, v[ACCEL_NOISE])
+            return StateReading(unnamed, q, accel)
         if row.kind is Kind.RANGE:
             to = str(self._ids[row.other])
-            powers = (v[1], v[2]) if row.has_power else (None, None)
-            return RangeReading(unnamed, to, v[0], *powers)
+            rx_power, fp_power = (v[1], v[2]) if row.has_power else (None, None)
+            nearer = None if row.node == self._index else str(self._ids[row.node])
+            return RangeReading(unnamed, to, v[0], rx_power, fp_power, nearer)
         if self._sample is None or row.t >= self._stuck_until:
             gyr, acc = (v[0], v[1], v[2]), (v[3], v[4], v[5])
             self._sample = ImuReading(unnamed, gyr, acc, self._mag)

@@ -34,6 +34,7 @@ from hardware_bridge.readings import (
     NearReading,
     OperatorReading,
     PairReading,
+    PeerReading,
     PoseReading,
     RangeReading,
     Reading,
@@ -45,8 +46,6 @@ from hardware_bridge.readings import (
 from tracking.constellation import Constellation
 from tracking.errors import ConfigError
 from tracking.measurements import Kind
-
-NS = 1e-9
 
 
 class Intake:
@@ -62,7 +61,7 @@ class Intake:
         Raises:
             BridgeError: A format or driver does not fit its options.
         """
-        self.group = config.constellation
+        self.group, self._alone = config.constellation, config.alone
         self.start_ns = start_ns
         self.events = Events()
         self.plausibility = Plausibility()
@@ -129,7 +128,7 @@ class Intake:
 
     def seconds(self, t_ns: int) -> float:
         """Convert host time to the time of the measurements [s]."""
-        return (t_ns - self.start_ns) * NS
+        return (t_ns - self.start_ns) * 1e-9
 
     def wrong_rate(self, node: int) -> str:
         """Return the notice about a node whose sample rate is not the configured one."""
@@ -182,8 +181,8 @@ class Intake:
         if isinstance(reading, NearReading):
             self.near.take(node, reading.bearing, reading.distance, arrival_ns)
             return
-        t_ns = stream.t_ns
-        if self._use(stream, reading, node, t_ns, arrival_ns) and stream.name.startswith("links."):
+        is_used = self._use(stream, reading, node, stream.t_ns, arrival_ns)
+        if is_used and stream.name.startswith("links."):
             self.received_ns[node] = arrival_ns
 
     def _judge(self, stream: Stream, source: Source, node: int, arrival_ns: int) -> None:
@@ -226,14 +225,14 @@ class Intake:
                     return False
                 self.events.add(t, Kind.STATE, node, (*q, *accel, 0.0))
                 self.sensed_ns[node] = arrival_ns
+            case PeerReading():
+                return self._use_peer(stream, reading, node, t, arrival_ns)
             case RangeReading():
                 return self._use_range(stream, reading, node, t_ns, arrival_ns)
             case MotionReading():
                 self.motion[node] = arrival_ns, reading
-            case StatusReading(voltage=voltage, fault=fault):
-                if voltage is not None:
-                    self.voltage[node] = voltage
-                self._note_fault(stream, node, fault, arrival_ns)
+            case StatusReading():
+                self._note_status(stream, node, reading, arrival_ns)
         return True
 
     def _repeats(
@@ -248,6 +247,20 @@ class Intake:
             text = f"node {self.group.ids[node]} repeats its last sample: its sensor is stuck"
             self.notices.append((arrival_ns, text))
         return bool(why)
+
+    def _use_peer(
+        self, stream: Stream, reading: PeerReading, sender: int, t: float, arrival_ns: int
+    ) -> bool:
+        node = self._naming.index(stream, reading.of, arrival_ns, named=True)
+        # The tracker of a group has the samples of the others, which say more. Motion may repeat: a
+        # node at rest sends the same again and again.
+        is_used = node != sender and self.group.ids[sender] == self._alone
+        if node is None or not is_used or not self.plausibility.allows_state(reading):
+            return False
+        values = (*reading.q_wb, *reading.accel_w, reading.noise)
+        self.events.add(t - reading.age, Kind.STATE, node, values)
+        self.received_ns[node] = arrival_ns
+        return True
 
     def _use_range(
         self, stream: Stream, reading: RangeReading, node: int, t_ns: int, arrival_ns: int
@@ -270,12 +283,15 @@ class Intake:
             self.received_ns[near] = self.received_ns[far] = arrival_ns  # the far node answered
         return True
 
-    def _note_fault(self, stream: Stream, node: int, fault: int, arrival_ns: int) -> None:
+    def _note_status(self, stream: Stream, node: int, reading: StatusReading, t_ns: int) -> None:
+        if reading.voltage is not None:
+            self.voltage[node] = reading.voltage
+        fault = reading.fault
         if fault == self.fault.get((stream.name, node), 0):
             return
         self.fault[stream.name, node] = fault
         what = f"reports fault {fault}" if fault else "reports no fault any more"
-        self.notices.append((arrival_ns, f"{stream.name}: node {self.group.ids[node]} {what}"))
+        self.notices.append((t_ns, f"{stream.name}: node {self.group.ids[node]} {what}"))
 
 
 def _only_antenna(group: Constellation, node: int) -> int:

@@ -109,6 +109,8 @@ class Bridge(OpenBridge):
                     self.recorder.add_event(start_ns, "calibration", text=text)
                 if self.marks is not None:
                     self.recorder.add_event(start_ns, "marks", known=self.marks.known)
+                if config.alone is not None:
+                    self.recorder.add_event(start_ns, "alone", node=config.alone)
                 self.recorder.add_event(start_ns, "start")
             self.supervisor: SupervisorProcess | None = None
             if drive:

@@ -5,6 +5,7 @@ Rewards and errors in ``info`` are based on the estimates, since there is no gro
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -20,6 +21,7 @@ from relpos_env.interface.infos import Columns, car_columns, make_figures
 from relpos_env.interface.observations import ObservationMode, total_size
 from relpos_env.interface.observations.base import F32
 from relpos_env.tasks import InformedTask, make_task, reward_weights
+from relpos_env.tasks.reassignment import Reassignment
 from relpos_env.timing import DECISION
 from tracking.arrays import F64, Bool
 
@@ -39,6 +41,10 @@ class Feed(Protocol):
 
     def decide(self, picture: Picture) -> None:
         """Send requested commands and estimates to the gate."""
+
+
+REASSIGN_EVERY = 10
+"""[-] Control steps after which a car that decides alone assigns slots again."""
 
 
 class LiveGroup:
@@ -70,7 +76,9 @@ class LiveGroup:
         self.swarm, self._feed = swarm, feed
         config = swarm.config
         n = config.n_slots
-        self.task = make_task(config.task.name, n, 1, config.task.room, **config.task.options)
+        made = partial(make_task, config.task.name, n, 1, config.task.room, **config.task.options)
+        self.task = made()
+        self._reassignment = None if config.alone is None else Reassignment(made)
         self._weights = reward_weights(config.task.name, self.task)
         self.estimated = EstimatedState(n)
         self._figures = make_figures(1, n, len(self.task.terms))
@@ -175,6 +183,8 @@ class LiveGroup:
             self._begun = self.cycles
         now = np.array([(self.cycles - self._begun) * DECISION])
         task.update(estimated, now, self._no_cars, here)
+        if self._reassignment is not None and self.cycles % REASSIGN_EVERY == 0:
+            self._reassignment.repeat(task, estimated, now, self._no_cars)
         if isinstance(task, InformedTask):
             task.inform(swarm.view.cov, swarm.view.ok, here)
         self._ask()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hardware_bridge.config import SwarmConfig, parse_config
+from hardware_bridge.config import SwarmConfig, alone, parse_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.marks import Marks, parse_marks
@@ -53,6 +53,9 @@ class ReplayFeed:
         self.recording, self._pace = recording, pace
         file = recording.path.name
         config = parse_config(recording.header.config, file=file, folder=Path(), with_files=False)
+        node = _alone(recording)
+        if node is not None:
+            config = alone(config, node)
         if filter is not None:
             filter_builder(filter)
             config = replace(config, tracker=replace(config.tracker, filter=filter))
@@ -129,6 +132,20 @@ def open_replay(
         ConfigError: Unknown filter.
     """
     return ReplayFeed(read_recording(path), pace, filter=filter)
+
+
+def _alone(recording: Recording) -> int | None:
+    """Return the node whose computer recorded for it alone; None if all cars were driven."""
+    for record in recording:
+        if record.kind == Kind.EVENT:
+            event = recording.event(record)
+            if event.get("event") == "alone":
+                if not isinstance(event.get("node"), int):
+                    raise BridgeError(f"{recording.path.name}: a record 'alone' is damaged")
+                return int(event["node"])
+            if event.get("event") == "start":
+                break
+    return None
 
 
 def _calibration(recording: Recording) -> Calibration | None:

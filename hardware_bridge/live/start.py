@@ -163,12 +163,17 @@ class Start:
 
     def _find(self, group: LiveGroup) -> None:
         """Run the excitation until all positions are known and all cars are back at their start."""
-        p, n = self._params, group.swarm.config.n_slots
+        p, config = self._params, group.swarm.config
+        n, alone = config.n_slots, config.alone is not None
         known, k, home = 0.0, 0, np.zeros(n, dtype=bool)
-        while not home.all():
+        # The others begin when their own computers do.
+        longest = p.wait if alone else p.find
+        is_ours = np.full(n, not alone)
+        is_ours[[config.slot_of(car) for car in config.cars]] = True
+        while not home[is_ours].all():
             known = known + DECISION if group.estimated.complete else 0.0
             t = k * DECISION
-            if home.any() or known >= p.sure or t >= p.find:
+            if home[is_ours].any() or known >= p.sure or t >= longest:
                 home |= is_home(p, n, t)
             speed, steering = wriggle(p, n, t)
             self._step(group, np.where(home, 0.0, speed), np.where(home, 0.0, steering))

@@ -128,13 +128,16 @@ class SafetyParams:
     with `cells`."""
     cell_stop: float = 3.2
     """[V] Cell voltage, mean over seconds, below which a car is disarmed."""
+    others_drive: bool = False
+    """True if other cars may be driven by gates of their own, on other computers: next to these a
+    car uses at most half of the clearance."""
     fence: Fence | None = None
     """Fence that the cars must not leave; None without a fence."""
 
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            if f.name == "fence":
+            if f.name in ("fence", "others_drive"):
                 continue
             least, most = LIMITS[f.name]
             if not least <= value <= most:

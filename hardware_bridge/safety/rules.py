@@ -139,7 +139,8 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
 
     A car may use half of the clearance, or all that the other cannot use at its speed if that is
     larger; next to a node that no gate limits, only the latter. Such a node (a person, a pushed
-    car) is assumed to keep its estimated speed in any direction.
+    car) is assumed to keep its estimated speed in any direction. If it may have a gate of its own
+    (`SafetyParams.others_drive`), a car also leaves it its half.
     """
     q, recent = m.picture, m.recent
     ahead = ahead_of(q)
@@ -163,6 +164,8 @@ def separation(m: Moment, p: SafetyParams) -> Verdict:
         gone = np.minimum(sign * q.speed, sign * recent.speed)[:, None, :] * -np.cos(off)
         room = room + np.where(sure & held, np.maximum(gone, 0.0) ** 2, 0.0) / (2.0 * p.hardest)
     share = np.maximum(room - used, np.where(held, 0.5 * room, 0.0))
+    if p.others_drive:
+        share = np.where(held, share, np.minimum(share, np.maximum(0.5 * room, 0.0)))
     # If the other may be within the separation already, its direction is uncertain within a lens:
     # the circle of its error around the estimate, outside of the separation circle around the car.
     error, least = DIRECTION * q.sigma, p.separation

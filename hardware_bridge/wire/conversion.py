@@ -15,6 +15,7 @@ from hardware_bridge.readings import (
     MotionReading,
     NearReading,
     OperatorReading,
+    PeerReading,
     RangeReading,
     Reading,
     Source,
@@ -83,6 +84,12 @@ def _of_state(r: StateReading) -> WireMessage:
     return wire.STATE, (*r.q_wb, *r.accel_w)
 
 
+def _of_peer(r: PeerReading) -> WireMessage:
+    if not is_unit(r.q_wb):
+        raise ValueError(f"q_wb: expected a unit quaternion, got {r.q_wb}")
+    return wire.PEER, (node_number("of", r.of), r.age, *r.q_wb, *r.accel_w, r.noise)
+
+
 def _of_range(r: RangeReading) -> WireMessage:
     has = (r.nearer is not None) | (r.rx_power is not None) << 1 | (r.fp_power is not None) << 2
     nearer = 0 if r.nearer is None else node_number("nearer", r.nearer)
@@ -110,6 +117,7 @@ def _of_drive(r: DriveReading) -> WireMessage:
 _OF: dict[type, Callable[[Any], WireMessage]] = {
     ImuReading: _of_imu,
     StateReading: _of_state,
+    PeerReading: _of_peer,
     RangeReading: _of_range,
     MotionReading: _of_motion,
     NearReading: _of_near,
@@ -149,6 +157,13 @@ def _as_state(s: Source, v: Row) -> Reading | None:
     return StateReading(s, (v[0], v[1], v[2], v[3]), (v[4], v[5], v[6])) if is_unit(v[:4]) else None
 
 
+def _as_peer(s: Source, v: Row) -> Reading | None:
+    if not is_unit(v[2:6]):
+        return None
+    q, accel = (v[2], v[3], v[4], v[5]), (v[6], v[7], v[8])
+    return PeerReading(s, name_of(v[0]), v[1], q, accel, v[9])
+
+
 def _as_range(s: Source, v: Row) -> Reading:
     has = int(v[6])
     rx = v[3] if has & 2 else None
@@ -181,6 +196,7 @@ AS_READING: dict[int, Callable[[Source, Row], Reading | None]] = {
     wire.RANGES.type: _as_range,
     wire.MOTION.type: _as_motion,
     wire.NEAR.type: _as_near,
+    wire.PEER.type: _as_peer,
     wire.STATUS.type: _as_status,
     wire.HEARTBEAT.type: lambda s, v: HeartbeatReading(s),
     wire.COMMAND.type: _as_drive,

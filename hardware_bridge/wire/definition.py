@@ -208,8 +208,32 @@ ACK = Message(
     fields=(Field(name="command", type="u32", meaning="sequence number of that command"),),
 )  # fmt: skip
 
+PEER = Message(
+    type=9, name="peer",
+    meaning="motion of another node, from its ranging messages; see `tracking.ranging`",
+    fields=(
+        Field(name="of", type="u16", meaning="the other node"),
+        Field(
+            name="age", type="u16", steps=10_000, unit="s",
+            meaning="of the motion, before the time of the frame",
+        ),
+        Field(
+            name="q", type="i24", n=4, steps=8_000_000,
+            meaning="unit quaternion w x y z, body to world",
+        ),
+        Field(
+            name="acc", type="i24", n=3, steps=10_000, unit="m/s2",
+            meaning="mean acceleration in the world frame, without gravity",
+        ),
+        Field(
+            name="noise", type="u16", steps=1000, unit="m/s2/sqrt(Hz)",
+            meaning="density that adds to that of its accelerometer",
+        ),
+    ),
+)  # fmt: skip
+
 MESSAGES = (
-    IMU, IMU_MAG, STATE, RANGES, MOTION, STATUS, HEARTBEAT, NEAR, COMMAND, REMOTE, ACK,
+    IMU, IMU_MAG, STATE, RANGES, MOTION, STATUS, HEARTBEAT, NEAR, PEER, COMMAND, REMOTE, ACK,
 )  # fmt: skip
 """All messages. Other types are reserved; receivers skip them."""
 

@@ -116,6 +116,16 @@ typedef struct {
     relpos_near_row row[RELPOS_MOST_ROWS];
 } relpos_near;
 
+/* motion of another node, from its ranging messages; see `tracking.ranging` */
+#define RELPOS_PEER 9u
+typedef struct {
+    uint16_t of; /* the other node */
+    uint16_t age; /* [1/10000 s] of the motion, before the time of the frame */
+    int32_t q[4]; /* [1/8000000] unit quaternion w x y z, body to world */
+    int32_t acc[3]; /* [1/10000 m/s2] mean acceleration in the world frame, without gravity */
+    uint16_t noise; /* [1/1000 m/s2/sqrt(Hz)] density that adds to that of its accelerometer */
+} relpos_peer;
+
 /* what a car is to do */
 #define RELPOS_COMMAND 16u
 #define RELPOS_COMMAND_FLAGS_BRAKE 1u
@@ -155,6 +165,7 @@ typedef struct {
         relpos_motion motion;
         relpos_status status;
         relpos_near near;
+        relpos_peer peer;
         relpos_command command;
         relpos_remote remote;
         relpos_ack ack;
@@ -567,6 +578,72 @@ static inline float relpos_near_row_distance(const relpos_near_row *m) {
     return (float)m->distance / 1000.0f;
 }
 
+#define RELPOS_PEER_BYTES 27u
+static inline void relpos_peer_put(const relpos_peer *m, uint8_t *out) {
+    relpos_put(out + 0, (uint32_t)m->of, 2);
+    relpos_put(out + 2, (uint32_t)m->age, 2);
+    relpos_put(out + 4, (uint32_t)m->q[0], 3);
+    relpos_put(out + 7, (uint32_t)m->q[1], 3);
+    relpos_put(out + 10, (uint32_t)m->q[2], 3);
+    relpos_put(out + 13, (uint32_t)m->q[3], 3);
+    relpos_put(out + 16, (uint32_t)m->acc[0], 3);
+    relpos_put(out + 19, (uint32_t)m->acc[1], 3);
+    relpos_put(out + 22, (uint32_t)m->acc[2], 3);
+    relpos_put(out + 25, (uint32_t)m->noise, 2);
+}
+static inline void relpos_peer_get(relpos_peer *m, const uint8_t *in) {
+    m->of = (uint16_t)relpos_get(in + 0, 2);
+    m->age = (uint16_t)relpos_get(in + 2, 2);
+    m->q[0] = (int32_t)relpos_get_signed(in + 4, 3);
+    m->q[1] = (int32_t)relpos_get_signed(in + 7, 3);
+    m->q[2] = (int32_t)relpos_get_signed(in + 10, 3);
+    m->q[3] = (int32_t)relpos_get_signed(in + 13, 3);
+    m->acc[0] = (int32_t)relpos_get_signed(in + 16, 3);
+    m->acc[1] = (int32_t)relpos_get_signed(in + 19, 3);
+    m->acc[2] = (int32_t)relpos_get_signed(in + 22, 3);
+    m->noise = (uint16_t)relpos_get(in + 25, 2);
+}
+/* [s]; 0 and nothing is set if the value is not finite. */
+static inline int relpos_peer_set_age(relpos_peer *m, float value) {
+    int32_t number;
+    if (!relpos_scale(value, 10000.0f, 0, 65535, &number)) return 0;
+    m->age = (uint16_t)number;
+    return 1;
+}
+static inline float relpos_peer_age(const relpos_peer *m) {
+    return (float)m->age / 10000.0f;
+}
+/* [-]; 0 and nothing is set if the value is not finite. */
+static inline int relpos_peer_set_q(relpos_peer *m, size_t k, float value) {
+    int32_t number;
+    if (!relpos_scale(value, 8000000.0f, -8388607 - 1, 8388607, &number)) return 0;
+    m->q[k] = (int32_t)number;
+    return 1;
+}
+static inline float relpos_peer_q(const relpos_peer *m, size_t k) {
+    return (float)m->q[k] / 8000000.0f;
+}
+/* [m/s2]; 0 and nothing is set if the value is not finite. */
+static inline int relpos_peer_set_acc(relpos_peer *m, size_t k, float value) {
+    int32_t number;
+    if (!relpos_scale(value, 10000.0f, -8388607 - 1, 8388607, &number)) return 0;
+    m->acc[k] = (int32_t)number;
+    return 1;
+}
+static inline float relpos_peer_acc(const relpos_peer *m, size_t k) {
+    return (float)m->acc[k] / 10000.0f;
+}
+/* [m/s2/sqrt(Hz)]; 0 and nothing is set if the value is not finite. */
+static inline int relpos_peer_set_noise(relpos_peer *m, float value) {
+    int32_t number;
+    if (!relpos_scale(value, 1000.0f, 0, 65535, &number)) return 0;
+    m->noise = (uint16_t)number;
+    return 1;
+}
+static inline float relpos_peer_noise(const relpos_peer *m) {
+    return (float)m->noise / 1000.0f;
+}
+
 #define RELPOS_COMMAND_BYTES 7u
 static inline void relpos_command_put(const relpos_command *m, uint8_t *out) {
     relpos_put(out + 0, (uint32_t)m->to, 2);
@@ -664,6 +741,9 @@ static inline int relpos_pack(const relpos_frame *f, uint8_t *out) {
         for (size_t k = 0; k < f->of.near.n; k++)
             relpos_near_row_put(&f->of.near.row[k], out + 1 + 5 * k);
         return 1 + 5 * f->of.near.n;
+    case RELPOS_PEER:
+        relpos_peer_put(&f->of.peer, out);
+        return 27;
     case RELPOS_COMMAND:
         relpos_command_put(&f->of.command, out);
         return 7;
@@ -715,6 +795,10 @@ static inline int relpos_unpack(relpos_frame *f, const uint8_t *in, size_t n) {
         f->of.near.n = in[0];
         for (size_t k = 0; k < f->of.near.n; k++)
             relpos_near_row_get(&f->of.near.row[k], in + 1 + 5 * k);
+        return 1;
+    case RELPOS_PEER:
+        if (n != 27) return 0;
+        relpos_peer_get(&f->of.peer, in);
         return 1;
     case RELPOS_COMMAND:
         if (n != 7) return 0;

@@ -1,6 +1,6 @@
 """Trackers of their own: every car runs its filter on its own IMU and on what its radio received.
 
-    block -> Orientation of every car -> sums of motion -> messages -> Horizon -> Filter -> view
+    block, receptions -> OwnEvents -> Horizon -> Filter -> view
 
 The estimates of a car are of its own tracker. It knows the motion of the others only from their
 messages (`tracking.ranging.compiled.motion`), and ranges from its own exchanges and the tables of
@@ -10,14 +10,13 @@ other nodes.
 from __future__ import annotations
 
 import copy
-from typing import NamedTuple
 
 import numpy as np
 
-from relpos_env.interface._own_kernels import note_own_ranges, share_events
+from relpos_env.interface._own_kernels import note_own_ranges
 from relpos_env.interface._view_kernels import forget_all
+from relpos_env.interface.own_events import OwnEvents
 from relpos_env.interface.views import AgentView, bind_view, make_view
-from tracking.ahrs.orientation import Orientation
 from tracking.arrays import F64, I64, Bool
 from tracking.constellation import Constellation
 from tracking.estimate import TeamEstimate
@@ -25,31 +24,8 @@ from tracking.filters import FilterBuilder, build_filter
 from tracking.kernels.jit import bind
 from tracking.late_data.horizon import Horizon
 from tracking.measurements import MeasurementBlock
-from tracking.ranging.compiled.motion import make_received, make_senders
 from tracking.ranging.compiled.overheard import Overheard
-from tracking.records import Records, as_records
 from tracking.tracker import TrackerParams
-
-
-class Events(NamedTuple):
-    """Events as in `MeasurementBlock`, in place; (row, slot)."""
-
-    t: F64
-    kind: I64
-    i: I64
-    j: I64
-    antenna_i: I64
-    antenna_j: I64
-    values: F64
-    has_power: Bool
-    valid: Bool
-    used: I64
-    """Number of events, (row)."""
-
-
-def events_of(block: MeasurementBlock) -> Events:
-    """Return the fields of a block for kernels that append to it."""
-    return Events._make((*block.in_place, np.zeros(block.n_envs, dtype=np.int64)))
 
 
 class OwnPerception:
@@ -84,18 +60,16 @@ class OwnPerception:
         rows = n_envs * n_cars
         self.constellation = constellation
         self._filter = build_filter(filter, constellation, params.filter, rows)
-        self._orientation = Orientation(
-            constellation, params.orientation, n_envs, follows_bias=self._filter.follows_bias
-        )
+        self._own = OwnEvents(
+            constellation, params.orientation, block, powered, overheard,
+            follows_bias=self._filter.follows_bias,
+        )  # fmt: skip
         self.horizon = Horizon(params.horizon, rows)
         self.horizon.reserve(room)
         self.view: AgentView = make_view(n_envs, n_cars, n_rangefinders)
         self.estimate = TeamEstimate.empty(constellation, np.zeros(rows))
         """Last estimates of all trackers, (env car), delayed by the horizon."""
         self._room = room
-        self._senders: Records = make_senders(n_envs, n_cars)
-        self._received: Records = make_received(n_envs, n_cars)
-        self._headings = np.zeros((n_envs, n_cars))
         self._now = np.zeros(rows)
         self._was_powered = np.zeros_like(powered)
         self.rebind(block, powered, overheard)
@@ -107,13 +81,12 @@ class OwnPerception:
         part, n = copy.copy(self), self.view.pos.shape[1]
         rows = slice(envs.start * n, envs.stop * n)
         part._filter, part.horizon = self._filter.part(rows), self.horizon.part(rows)
-        part._orientation = self._orientation.part(envs)
+        part._own = self._own.part(envs, block, powered, overheard)
         part.view, whole = self.view.part(envs), self.estimate
         part.estimate = TeamEstimate(
             whole.constellation, whole.t[rows], *(array[rows] for array in whole.arrays)
         )
-        part._senders, part._received = self._senders[envs], self._received[envs]
-        part._headings, part._now = self._headings[envs], self._now[rows]
+        part._now = self._now[rows]
         part._was_powered = self._was_powered[envs]
         part.rebind(block, powered, overheard)
         return part
@@ -143,12 +116,11 @@ class OwnPerception:
 
     def reset(self, env: int) -> None:
         """Reset trackers, horizons and ranges of one environment."""
-        self._orientation.reset(env)
+        self._own.reset(env)
         n = self._powered.shape[1]
         for row in range(env * n, (env + 1) * n):
             self._filter.reset(row)
             self.horizon.reset(row)
-        self._senders[env], self._received[env] = 0, 0
         self._was_powered[env] = False
         forget_all(self.view, env)
 
@@ -157,51 +129,35 @@ class OwnPerception:
         for env, car in np.argwhere(self._powered & ~self._was_powered).tolist():
             self._switch_on(env, car)
         self._was_powered[:] = self._powered
-        # A copy: the orientation stage replaces samples by states, in place.
-        for target, source in zip(self._states.arrays, self._block.arrays, strict=True):
-            np.copyto(target, source)
-        self._orient()
-        self._distribute()
+        self._own.step()
         self._now.reshape(self._powered.shape)[:] = self.view.now[:, None]
         self._wait()
         self.estimate.t[:] = self.horizon.state.released
         self._follow()
         self._see()
         # The orientation of the own car needs no message: it is that of the last sample.
-        np.copyto(self.view.heading, self._headings, where=self.view.oriented)
+        np.copyto(self.view.heading, self._own.headings, where=self.view.oriented)
         self._note()
 
     def _switch_on(self, env: int, car: int) -> None:
-        """Reset the tracker of a car and what it received; its sums start again."""
+        """Reset the tracker of a car and what it received."""
         row = env * self._powered.shape[1] + car
         self._filter.reset(row)
         self.horizon.reset(row)
-        self._received[env, car] = 0
-        self._overheard.last[env, car] = 0
-        self._senders["running"][env, car] = False
+        self._own.switch_on(env, car)
 
     def rebind(self, block: MeasurementBlock, powered: Bool, overheard: Overheard) -> None:
         """Bind the kernels to their arrays; arguments as in the constructor."""
         self._block, self._powered, self._overheard = block, powered, overheard
         view, rows = self.view, powered.size
-        # Own samples, members, and two states or a range for each reception.
-        n = powered.shape[1]
-        slots = block.n_events // n + 4 * n + 3 * overheard.t.shape[1] // n
-        own = MeasurementBlock.empty(rows, slots)
-        events = events_of(own)
+        self._own.rebind(block, powered, overheard)
         due = MeasurementBlock.empty(rows, self._room)
-        self._states = MeasurementBlock.empty(len(view.now), block.n_events)
-        self._orient = self._orientation.bind(self._states)
-        self._distribute = bind(
-            share_events, events_of(self._states), overheard, as_records(self._senders),
-            as_records(self._received), self._headings, powered, events,
-        )  # fmt: skip
-        self._wait = self.horizon.bind(own, self._now, due)
+        self._wait = self.horizon.bind(self._own.block, self._now, due)
         self._follow = self._filter.bind(due, self.estimate.with_time_axis())
         self._see = bind_view(view, self.estimate, powered, np.zeros(powered.shape))
-        self._note = bind(note_own_ranges, events, view)
+        self._note = bind(note_own_ranges, self._own.events, view)
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state without the bound kernels; the owner must call `rebind` again."""
-        bound = ("_orient", "_distribute", "_wait", "_follow", "_see", "_note")
+        bound = ("_wait", "_follow", "_see", "_note")
         return {k: v for k, v in self.__dict__.items() if k not in bound}

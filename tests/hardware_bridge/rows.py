@@ -147,14 +147,18 @@ class Drive(Talking):
             lambda s: "armed" in s and all(s["armed"][k] for k in cars), seconds, since
         )
 
-    def arm(self):
-        """Arm all cars as soon as possible; return the time when they are armed [ns]."""
+    def arm(self, cars=range(3)):
+        """Arm cars as soon as possible; return the time when they are armed [ns]."""
         since = time.monotonic_ns()
         self.wait_for(
-            lambda s: "armed" in s and not all(s["armed"]) and min(s["well_for"]) > 0.55,
+            lambda s: (
+                "armed" in s
+                and not all(s["armed"][k] for k in cars)
+                and min(s["well_for"][k] for k in cars) > 0.55
+            ),
             since=since,
         )
-        return self.moving(self.tell(order="arm"))["t_ns"]
+        return self.moving(self.tell(order="arm"), cars)["t_ns"]
 
     def signal(self, what):
         """Send a signal to the deciding process; return a time before its reception [ns]."""

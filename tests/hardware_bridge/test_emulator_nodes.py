@@ -221,7 +221,7 @@ def test_a_twin_lies_still_under_the_same_id():
 
 
 def test_states_and_rows_that_no_device_sends():
-    state = Measured(0.1, Kind.STATE, 0, (1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3, 0.0), False)
+    state = Measured(0.1, Kind.STATE, 0, 0, (1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3, 0.0), False)
     block = MeasurementBlock.of_kind(
         Kind.JOIN, np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 0))
     )

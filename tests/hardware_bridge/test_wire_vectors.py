@@ -17,6 +17,7 @@ from hardware_bridge.readings import (
     MotionReading,
     NearReading,
     OperatorReading,
+    PeerReading,
     RangeReading,
     Source,
     StateReading,
@@ -34,7 +35,7 @@ def at(time, node=3, boot=7, sequence=0):
     return Source(str(node), boot, sequence, time, MICROSECONDS_32)
 
 
-V0, V1, V2, V3, V4, V5, V6, V7, V8, V9, V10 = (at(1000 * k, sequence=k) for k in range(11))
+V0, V1, V2, V3, V4, V5, V6, V7, V8, V9, V10, V11 = (at(1000 * k, sequence=k) for k in range(12))
 IMU_ROW = [1000, -2000, 3000, 0, 0, 98100]
 VECTORS = [
     ([HeartbeatReading(V0)], wire.HEARTBEAT, [[]]),
@@ -52,6 +53,8 @@ VECTORS = [
     ([DriveReading(V9, "4", 1.5, -0.42, False)], wire.COMMAND, [[4, 1500, -4200, 0]]),
     ([NearReading(V10, 0.5, 1.25), NearReading(V10, -1.0, None)], wire.NEAR,
      [[5000, 1250, 1], [-10000, 0, 0]]),
+    ([PeerReading(V11, "5", 0.05, TURN, (0.5, -0.25, 0.0), 0.125)], wire.PEER,
+     [[5, 500, 4_800_000, 0, 0, -6_400_000, 5000, -2500, 0, 125]]),
 ]  # fmt: skip
 """Readings of node 3 and boot 7, their message and the numbers of its rows."""
 

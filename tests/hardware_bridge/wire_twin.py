@@ -15,6 +15,7 @@ from hardware_bridge.readings import (
     ImuReading,
     MotionReading,
     OperatorReading,
+    PeerReading,
     RangeReading,
     Source,
     StateReading,
@@ -114,6 +115,8 @@ turns = st.sampled_from([(1.0, 0.0, 0.0, 0.0), (0.5, -0.5, 0.5, -0.5), (0.0, 0.6
 readings = st.one_of(
     st.builds(ImuReading, sources, gyr, acc, mag=st.none() | mag),
     st.builds(StateReading, sources, turns, acc),
+    st.builds(PeerReading, sources, names, st.integers(0, 65535).map(lambda n: n / 10_000), turns,
+              acc, st.integers(0, 65535).map(lambda n: n / 1000)),
     st.builds(RangeReading, sources, names, steps(32, 10_000), powers, powers, st.none() | names),
     st.builds(MotionReading, sources, steps(16, 1000), st.none() | steps(16, 10_000)),
     st.builds(StatusReading, sources, st.none() | st.integers(0, 65535).map(lambda n: n / 1000),
@@ -140,6 +143,8 @@ def spread(seed, n, key=None):
         ]  # fmt: skip
         if message.name == "state":
             rows = [[8_000_000, 0, 0, 0, *rows[0][4:]]]
+        if message.name == "peer":
+            rows = [[*rows[0][:2], 8_000_000, 0, 0, 0, *rows[0][6:]]]
         out.append(
             frame(message.type, 3, 7, k, rng.randrange(1 << 32), payload(message, rows), key)
         )

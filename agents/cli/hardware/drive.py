@@ -25,6 +25,12 @@ EVERY = 10
 
 @click.command()
 @click.option("--config", type=Path, required=True, help="swarm.toml; see docs/how-to/hardware.md.")
+@click.option(
+    "--node",
+    type=int,
+    metavar="N",
+    help="Drive the car of this node alone, on its own computer, by what its own radio received.",
+)
 @policy_option
 @click.option(
     "--controller",
@@ -52,6 +58,7 @@ EVERY = 10
 @json_option
 def drive(
     config: Path,
+    node: int | None,
     policy: str | None,
     controller: str | None,
     observation: str | None,
@@ -87,6 +94,7 @@ def drive(
     with _Screen(as_json, stop_source) as screen:
         result = run(
             config=config,
+            node=node,
             name=policy or controller or "consensus",
             observation=observation,
             arm=arm,

@@ -34,6 +34,14 @@ from agents.errors import UsageError
     "it earlier.",
 )
 @click.option(
+    "--trackers",
+    type=click.Choice(["group", "own"]),
+    default="group",
+    show_default=True,
+    help="own: each node also sends what its radio received of the others, for `relpos drive "
+    "--node` on each car; without an operator.",
+)
+@click.option(
     "--format",
     default="relpos",
     show_default=True,

@@ -30,6 +30,8 @@ class DriveLog:
         self._title, self._bridge, self._env = title, bridge, env
         self._n, self._n_late, self._began_ns = 0, 0, 0
         n, room = bridge.config.n_slots, min(cycles, MOST_KEPT)
+        self._is_driven = np.zeros(n)
+        self._is_driven[[bridge.config.slot_of(car) for car in bridge.config.cars]] = 1.0
         self._t_ns = np.full(room, -1, dtype=np.int64)
         self._target = np.full((room, n, n, 2), np.nan)
         self._has_target = np.full((room, n, n), True)
@@ -50,7 +52,7 @@ class DriveLog:
         self._t_ns[k] = group.t_ns
         self._target[k], self._has_target[k] = task.target[0], task.has_target[0]
         self._error[k] = task.error[0, present].mean() if present.any() else np.nan
-        self._command[k] = group.asked
+        self._command[k] = group.asked * self._is_driven[:, None]
         self._passed[k] = 0.0
         self._lag[k] = np.nan
         if report is not None:

@@ -14,7 +14,7 @@ from agents.driver import Driver
 from agents.errors import UsageError
 from agents.hardware.drive.log import DriveLog
 from agents.hardware.drive.result import DriveResult
-from hardware_bridge.config import SwarmConfig, read_config
+from hardware_bridge.config import SwarmConfig, alone, read_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.bridge import Bridge
 from hardware_bridge.live.env import HardwareFormationEnv
@@ -29,6 +29,7 @@ MOST_CYCLES = 800_000
 def drive(
     *,
     config: SwarmConfig | Path | str,
+    node: int | None = None,
     name: str = CONTROLLER,
     observation: str | None = None,
     arm: bool = False,
@@ -42,6 +43,7 @@ def drive(
 
     Args:
         config: Path of a swarm.toml, or the result of `read_config`.
+        node: Node of the only car to drive, on its own computer; see `alone`. None drives all.
         name: A controller of `agents.controllers.CONTROLLERS`, or a policy as for
             `agents.policies.load_policy`.
         observation: Observation mode; by default that of the policy's training, or `estimate`.
@@ -59,6 +61,8 @@ def drive(
         UsageError: No driver of that name, or it does not fit these cars.
     """
     swarm = config if isinstance(config, SwarmConfig) else read_config(config)
+    if node is not None:
+        swarm = alone(swarm, node)
 
     def open_bridge() -> Bridge:
         return Bridge(swarm, drive=True, arm=arm, wait=wait, record=record)

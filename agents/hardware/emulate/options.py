@@ -14,6 +14,7 @@ from hardware_bridge.errors import BridgeError
 from hardware_bridge.readings import ImuReading
 from hardware_bridge.wire.key import KEY_BYTES
 from relpos_env.config import FormationConfig, Parts, whole_number
+from relpos_env.core.tracked_world import Trackers
 from relpos_env.errors import EnvError
 from relpos_env.interface.rangefinders import MAX_RANGEFINDERS
 from relpos_env.scenarios import Scenario
@@ -48,6 +49,9 @@ class EmulateOptions:
     """[-] Seed of the episode, as of `relpos_env.api.parallel_env.FormationEnv.reset`."""
     seconds: float = 60.0
     """[s] Length after the release of the cars, at `relpos_env.timing.STAND_STILL`."""
+    trackers: Trackers = "group"
+    """``own``: each node also sends what its radio received of the others, for a tracker on its
+    own car; there is no operator then, and a ``swarm-ID.toml`` for each car."""
     format: str = "relpos"
     """Format of the nodes, see `hardware_bridge.emulator.formats`."""
     imu_format: str | None = None
@@ -72,6 +76,10 @@ class EmulateOptions:
     def __post_init__(self) -> None:
         if self.driver == "pwm" and not self.driver_options:
             object.__setattr__(self, "driver_options", SLOW_PWM)
+        if self.trackers == "own":
+            object.__setattr__(self, "operator", False)
+            if self.format != "relpos":
+                raise BridgeError(f"format: expected relpos with own trackers, got {self.format!r}")
         if not DECISION <= self.seconds <= LONGEST:
             raise EnvError(f"seconds: expected {DECISION:g} to {LONGEST:g}, got {self.seconds!r}")
         whole_number("proximity", self.proximity, 0, MAX_RANGEFINDERS)
@@ -109,6 +117,7 @@ class EmulateOptions:
             task_options=self.task_options,
             n_cars=self.cars,
             proximity=self.proximity,
+            trackers=self.trackers,
             max_cycles=self.cycles,
         ).resolve()
 

@@ -126,21 +126,25 @@ class EmulatedRig:
         """Unplug all devices."""
         self.emulator.close()
 
-    def swarm_toml(self, folder: Path) -> str:
+    def swarm_toml(self, folder: Path, only: int | None = None) -> str:
         """Return the text of ``swarm.toml``.
 
         Args:
             folder: Folder of the ports.
+            only: Node whose links and car are listed; None for all.
         """
         nodes = [(d.node, [line.name for line in d.lines]) for d in self.emulator.nodes]
-        return swarm_toml(self.options, self.world.parts, self.constellation, nodes, folder)
+        return swarm_toml(self.options, self.world.parts, self.constellation, nodes, folder, only)
 
     def _write(self, folder: Path) -> None:
-        """Write ``swarm.toml`` atomically."""
-        text = self.swarm_toml(folder)
-        write_safely(folder / SWARM_FILE, text, mode=0o644 if self.options.key is None else 0o600)
-        # These devices are new, so the replay protection of earlier ones with these ids is reset.
-        (folder / SWARM_FILE).with_suffix(".marks.json").unlink(missing_ok=True)
+        """Write ``swarm.toml`` atomically, after those of single cars."""
+        alone = self.constellation.ids if self.options.trackers == "own" else ()
+        files = {f"swarm-{node}.toml": node for node in alone}
+        for name, only in [*files.items(), (SWARM_FILE, None)]:
+            text = self.swarm_toml(folder, only)
+            write_safely(folder / name, text, mode=0o644 if self.options.key is None else 0o600)
+            # These devices are new: the replay protection of earlier ones with these ids is reset.
+            (folder / name).with_suffix(".marks.json").unlink(missing_ok=True)
 
     def _plug_in(self, ids: tuple[int, ...]) -> Emulator:
         """Return an emulator with all devices on their lines."""

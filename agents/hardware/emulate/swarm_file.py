@@ -24,6 +24,7 @@ def swarm_toml(
     constellation: Constellation,
     nodes: Sequence[tuple[EmulatedNode, Sequence[str]]],
     folder: Path,
+    only: int | None = None,
 ) -> str:
     """Return the text of the file.
 
@@ -33,6 +34,7 @@ def swarm_toml(
         constellation: Constellation of the nodes.
         nodes: Every node with the names of its ports.
         folder: Folder of the ports.
+        only: Node whose links and car are listed, for the computer of that car; None for all.
     """
     ids = constellation.ids
     table: dict[str, Any] = {
@@ -46,9 +48,12 @@ def swarm_toml(
         "links": {
             name: _link(wire, node.node, ids, folder / name, options.key)
             for node, names in nodes
+            if only in (None, node.node)
             for wire, name in zip(node.formats, names, strict=True)
         },
-        "cars": {node: _car(options, folder / car_port(node)) for node in ids},
+        "cars": {
+            node: _car(options, folder / car_port(node)) for node in ids if only in (None, node)
+        },
         # Antennas of the scenarios are calibrated.
         "calibration": {"uncalibrated": True},
         "task": {

@@ -13,9 +13,11 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from relpos_env.config import Parts
+from relpos_env.interface.own_events import OwnEvents
 from relpos_env.scenarios.episode import Episode, draw_episode
 from relpos_env.sensors.operator import Operator
 from relpos_env.simulation.recorder import Recording
+from relpos_env.tasks.reassignment import Reassignment
 from relpos_env.timing import DECISION, DT, SOON, STAND_STILL
 from relpos_env.world.world import World
 from tracking.arrays import F64, Bool
@@ -39,10 +41,23 @@ class EmulatedWorld:
             record: Whether to keep measurements and truth in `recording`.
         """
         self.parts = parts
-        self._swarm = World(
-            parts.scenario, parts.n_cars, n_steps=1, proximity=parts.config.proximity
+        is_own = parts.config.trackers == "own"
+        self._swarm = swarm = World(
+            parts.scenario,
+            parts.n_cars,
+            n_steps=1,
+            proximity=parts.config.proximity,
+            sends_motion=is_own,
         )
+        self._own: OwnEvents | None = None
+        self._was_powered = np.zeros_like(swarm.powered)
+        if is_own:
+            inputs = swarm.block, swarm.powered, swarm.overheard
+            self._own = OwnEvents(
+                swarm.constellation, parts.params.orientation, *inputs, follows_bias=False
+            )
         self._task = parts.make_task(1)
+        self._reassignment = Reassignment(lambda: parts.make_task(1)) if is_own else None
         self._operator = Operator(parts.config.operator, parts.n_cars, 1)
         self.recording = Recording() if record else None
         self.collisions = 0
@@ -112,6 +127,11 @@ class EmulatedWorld:
             self._driven = self.present.copy()
         block = self._swarm.step((speed * self._driven)[None], (steering * self._driven)[None])
         self._steps += 1
+        if self._own is not None:
+            for car in np.flatnonzero(self.powered & ~self._was_powered[0]).tolist():
+                self._own.switch_on(0, car)
+            self._was_powered[:] = self._swarm.powered
+            self._own.step()
         if self.recording is not None:
             self.recording.add_swarm(self._swarm)
         self._touched += self._swarm.contacts
@@ -121,6 +141,10 @@ class EmulatedWorld:
         if self.just_judged:
             self._judge()
         return block
+
+    def known(self) -> MeasurementBlock | None:
+        """Return what each car's radio received; None with one tracker for the group."""
+        return None if self._own is None else self._own.block
 
     def motion(self) -> tuple[F64, F64]:
         """Return odometer speeds [m/s] and steering angles [rad], (car)."""
@@ -137,6 +161,10 @@ class EmulatedWorld:
         """Update task, operator and the count of collisions."""
         swarm = self._swarm
         self._task.update(swarm.state, swarm.t - STAND_STILL, self._touched, slice(0, 1))
+        if self._reassignment is not None:
+            # By the truth, as cars that decide alone do by their estimates.
+            t = swarm.t - STAND_STILL
+            self._reassignment.repeat(self._task, swarm.state, t, self._touched)
         self._operator.sample(swarm.state, self._task, slice(0, 1))
         if self._steps > AT_REST:
             self.collisions += int(self._touched.sum())
