@@ -18,6 +18,7 @@ from agents.policies import Layout, TrainedPolicy, load_policy
 from agents.simulation.frames import FrameRecorder, errors
 from relpos_env import formation_v0
 from relpos_env.api.parallel_env import FormationEnv
+from relpos_env.core.tracked_world import Trackers
 from relpos_env.timing import DECISION
 from tracking.filters import DEFAULT_FILTER, FILTERS, filter_builder
 from tracking.log.folder import Log
@@ -102,6 +103,7 @@ def demo(
     controller: str | None = None,
     policy: str | Path | None = None,
     filter: str = DEFAULT_FILTER,
+    trackers: Trackers = "group",
     filters: Sequence[str] = tuple(FILTERS),
     window: bool = False,
     film: Callable[[Any], None] | None = None,
@@ -121,6 +123,7 @@ def demo(
         controller: One of `agents.controllers.CONTROLLERS`, by default `CONTROLLER`.
         policy: A trained policy, as for `load_policy`, in place of the controller.
         filter: Filter of the cars, one of `tracking.filters.FILTERS`.
+        trackers: One tracker for the group, or one on each car.
         filters: Filters that track the recorded drive for comparison.
         window: Show the drive on estimates in a window; needs pygame.
         film: Called with a picture of the drive on estimates after every control step, uint8
@@ -174,6 +177,7 @@ def demo(
             max_cycles=round(seconds / DECISION),
             record=information == "estimate",
             filter=filter,
+            trackers=trackers,
             render_mode=render if information == "estimate" else None,
         )
         driver: Driver
@@ -182,13 +186,7 @@ def demo(
         else:
             driver = trained.driver(Layout(mode, len(env.possible_agents), history, proximity or 0))
         drives[information] = drive(
-            env,
-            driver,
-            seed,
-            blind=information == "nothing",
-            progress=tell,
-            watch=show,
-            film=film,
+            env, driver, seed, blind=information == "nothing", progress=tell, watch=show, film=film
         )
         if information == "estimate":
             name = env.scenario.name

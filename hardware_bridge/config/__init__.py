@@ -1,6 +1,6 @@
 """swarm.toml: the nodes of the group, the ports and the permitted actions."""
 
-from hardware_bridge.config.alone import alone
+from hardware_bridge.config.alone import alone, known_by
 from hardware_bridge.config.read import parse_config, read_config
 from hardware_bridge.config.swarm import CarConfig, LinkConfig, SwarmConfig, TaskConfig
 
@@ -10,6 +10,7 @@ __all__ = [
     "SwarmConfig",
     "TaskConfig",
     "alone",
+    "known_by",
     "parse_config",
     "read_config",
 ]

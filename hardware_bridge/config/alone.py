@@ -11,6 +11,26 @@ TASKS_ALONE = ("hold", "rendezvous", "escort", "seek")
 """Tasks without a plan over time, which computers without a common clock cannot share."""
 
 
+def known_by(config: SwarmConfig, node: int) -> SwarmConfig:
+    """Return the configuration for a tracker that knows what one node knows.
+
+    Args:
+        config: Configuration with the links of this node.
+        node: A node that moves.
+
+    Raises:
+        BridgeError: The file has no such node.
+    """
+    group = config.constellation
+    moving = [each.id for each in group.nodes if each.kind == "moving"]
+    if node not in moving:
+        known = ", ".join(map(str, moving))
+        raise BridgeError(f"--node: expected a node that moves ({known}), got {node}")
+    cars = tuple(car for car in config.cars if car.node == node)
+    safety = replace(config.safety, others_drive=True)
+    return replace(config, cars=cars, safety=safety, alone=node)
+
+
 def alone(config: SwarmConfig, node: int) -> SwarmConfig:
     """Return the configuration for the computer of one car.
 
@@ -24,8 +44,8 @@ def alone(config: SwarmConfig, node: int) -> SwarmConfig:
     Raises:
         BridgeError: The file has no such car, or the task needs a plan that all cars share.
     """
-    cars = tuple(car for car in config.cars if car.node == node)
-    if not cars:
+    config_alone = known_by(config, node)
+    if not config_alone.cars:
         known = ", ".join(str(car.node) for car in config.cars) or "none"
         raise BridgeError(f"--node: expected a car of [cars] ({known}), got {node}")
     if config.task.name not in TASKS_ALONE:
@@ -37,5 +57,4 @@ def alone(config: SwarmConfig, node: int) -> SwarmConfig:
         raise BridgeError(
             'task.command: a car alone expects "plan", got "link": an operator commands a group'
         )
-    safety = replace(config.safety, others_drive=True)
-    return replace(config, cars=cars, safety=safety, alone=node)
+    return config_alone

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hardware_bridge.config import SwarmConfig, alone, parse_config
+from hardware_bridge.config import SwarmConfig, known_by, parse_config
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.marks import Marks, parse_marks
@@ -55,7 +55,7 @@ class ReplayFeed:
         config = parse_config(recording.header.config, file=file, folder=Path(), with_files=False)
         node = _alone(recording)
         if node is not None:
-            config = alone(config, node)
+            config = known_by(config, node)
         if filter is not None:
             filter_builder(filter)
             config = replace(config, tracker=replace(config.tracker, filter=filter))

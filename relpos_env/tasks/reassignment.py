@@ -1,4 +1,4 @@
-"""Slots that are assigned anew while cars drive, for cars that decide alone.
+"""Slots that are assigned again while cars drive, for cars that decide alone.
 
 Every computer assigns slots by the positions that it estimates, so assignments can differ where two
 are nearly as good. Repeated while the cars drive, they become the same: the cars' own motion

@@ -390,6 +390,17 @@ def test_a_demonstration_of_a_task_that_ends(tmp_path):
     assert result.done == (result.seconds < 40.0)
 
 
+def test_a_demonstration_with_a_tracker_on_each_car():
+    from agents.simulation.demo import demo
+
+    errors = [
+        demo(seconds=15.0, seed=1, trackers=trackers, filters=[]).formation_error
+        for trackers in ("group", "own")
+    ]
+    assert errors[0] != errors[1]
+    assert max(errors) < 0.5
+
+
 def test_contacts_of_a_demonstration_are_those_of_its_steps():
     """The reference counts the contacts of the steps independently."""
     from agents.controllers import Consensus

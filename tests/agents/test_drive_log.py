@@ -24,7 +24,11 @@ def drive_of(decisions, cycles):
     report = SimpleNamespace(speed=np.zeros(N), steering=np.zeros(N), lag=0.0, missed=2)
     notices = [(0, "cars.1 stopped: its port is lost"), (1, "cars.1 up")]
     feed = SimpleNamespace(report=report, n_late=4, notices=notices)
-    bridge = SimpleNamespace(feed=feed, config=SimpleNamespace(n_slots=N), recording_lost=None)
+    bridge = SimpleNamespace(
+        feed=feed,
+        config=SimpleNamespace(n_slots=N, cars=range(N), slot_of=int),
+        recording_lost=None,
+    )
     log = DriveLog("test", bridge, SimpleNamespace(group=group), cycles)
     log.first()
     feed.n_late = 5

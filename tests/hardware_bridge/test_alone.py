@@ -1,5 +1,6 @@
 """A car whose computer decides for it alone: configuration, motion of the others, limits."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from safety_group import check, picture
 from agents.hardware.emulate import EmulatedRig, EmulateOptions
 from agents.hardware.emulate.rig import STEP_NS
 from agents.hardware.emulate.world import STEPS
-from hardware_bridge.config import alone, parse_config
+from hardware_bridge.config import alone, known_by, parse_config
 from hardware_bridge.emulator.ports import MemoryPort
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
@@ -74,7 +75,7 @@ def test_only_its_own_car_is_driven_and_the_others_have_half_of_the_way():
 @pytest.mark.parametrize(
     ("config", "node", "said"),
     [
-        (config_of(), 7, r"^--node: expected a car of \[cars\] \(1, 2, 3\), got 7"),
+        (config_of(), 7, r"^--node: expected a node that moves \(1, 2, 3\), got 7"),
         (config_of("ring"), 2, "^task.name: .* expects one of hold, .*, got 'ring'"),
         (config_of(command="link"), 2, '^task.command: .* expects "plan"'),
     ],
@@ -82,6 +83,13 @@ def test_only_its_own_car_is_driven_and_the_others_have_half_of_the_way():
 def test_what_computers_cannot_share_is_refused(config, node, said):
     with pytest.raises(BridgeError, match=said):
         alone(config, node)
+
+
+def test_listening_alone_needs_no_car_and_no_certain_task():
+    config = known_by(replace(config_of("ring"), cars=()), 2)
+    assert config.alone == 2
+    with pytest.raises(BridgeError, match="^--node: expected a node that moves"):
+        known_by(config_of(), 4)
 
 
 def test_motion_of_others_is_a_state_at_its_own_time():

@@ -23,6 +23,12 @@ BROWSER = "browser"
 
 @click.command()
 @click.option("--config", type=Path, required=True, help="swarm.toml; see docs/how-to/hardware.md.")
+@click.option(
+    "--node",
+    type=int,
+    metavar="N",
+    help="Track by what the radio of this node received, as its own computer would.",
+)
 @click.option("--seconds", type=float, help="Length [s].  [default: until Ctrl-C]")
 @click.option("--record", type=Path, help="New file for a recording of all bytes.")
 @click.option(
@@ -34,7 +40,12 @@ BROWSER = "browser"
 )
 @json_option
 def live(
-    config: Path, seconds: float | None, record: Path | None, view: str | None, as_json: bool
+    config: Path,
+    node: int | None,
+    seconds: float | None,
+    record: Path | None,
+    view: str | None,
+    as_json: bool,
 ) -> None:
     """Track a live swarm: nodes, relative positions and their uncertainty."""
     from agents.hardware.live import live as run
@@ -55,7 +66,7 @@ def live(
             if viewer is not None:
                 viewer.show(monitor.snapshot(), notices)
 
-        result = run(swarm, seconds=seconds, record=record, watch=watch, keep=False)
+        result = run(swarm, node=node, seconds=seconds, record=record, watch=watch, keep=False)
     if as_json:
         emit_json({"result": "stream", **stream} for stream in result.streams)
         emit_json([result.summary])

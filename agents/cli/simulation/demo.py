@@ -45,6 +45,13 @@ from agents.errors import UsageError
     show_default=True,
     help="Filter of the tracker: joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf.",
 )
+@click.option(
+    "--trackers",
+    type=click.Choice(["group", "own"]),
+    default="group",
+    show_default=True,
+    help="group: one tracker receives the samples of all cars; own: one on each car.",
+)
 @click.option("--window", is_flag=True, help="Show the drive in a window; needs pygame.")
 @click.option("--gif", is_flag=True, help="Write drive.gif too; needs pygame.")
 @out_options("report.html and drive.gif", default=Path("demo"))

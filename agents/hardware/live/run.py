@@ -10,7 +10,7 @@ from agents.errors import UsageError
 from agents.hardware.live.checks import Checks
 from agents.hardware.live.monitor import Monitor
 from agents.hardware.live.result import LiveResult
-from hardware_bridge.config import SwarmConfig, read_config
+from hardware_bridge.config import SwarmConfig, known_by, read_config
 from hardware_bridge.live.bridge import Bridge
 from hardware_bridge.live.feed import LiveFeed
 from hardware_bridge.live.swarm import load_calibration
@@ -22,6 +22,7 @@ Watch = Callable[[Monitor, list[tuple[float, str]]], bool | None]
 def live(
     config: SwarmConfig | Path | str,
     *,
+    node: int | None = None,
     seconds: float | None = None,
     record: Path | str | None = None,
     watch: Watch | None = None,
@@ -31,6 +32,8 @@ def live(
 
     Args:
         config: Path of a swarm.toml, or the result of `read_config`.
+        node: Node by whose own messages the swarm is tracked, see `known_by`; None tracks it by
+            those of all.
         seconds: Length [s]; None runs until Ctrl-C.
         record: File for a recording.
         watch: Called after every decision.
@@ -43,6 +46,8 @@ def live(
     if seconds is not None and not 0.0 < seconds < float("inf"):
         raise UsageError(f"seconds: expected a number above 0, got {seconds:g}")
     swarm = config if isinstance(config, SwarmConfig) else read_config(config)
+    if node is not None:
+        swarm = known_by(swarm, node)
     notices: list[tuple[float, str]] = []
     checks = Checks(swarm.name, swarm.constellation, load_calibration(swarm))
     with contextlib.closing(checks), Bridge(swarm, record=record) as bridge:
