@@ -14,7 +14,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from tables import env_speed, environment, hardware, measured, tracker
+from tables import algorithms, env_speed, environment, hardware, measured, tracker
 from tables.api import api
 from tables.markdown import markdown
 
@@ -43,6 +43,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "tracker-cost": measured.tracker_cost,
     "policy-results": measured.policy_results,
     "observe-results": measured.observe_results,
+    "algorithms": algorithms.algorithms,
     "room-results": measured.room_results,
     "recording-results": measured.recording_results,
     "mds-results": measured.mds_results,

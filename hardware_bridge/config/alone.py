@@ -53,6 +53,12 @@ def alone(config: SwarmConfig, node: int) -> SwarmConfig:
             f"task.name: a car alone expects one of {', '.join(TASKS_ALONE)}, got "
             f"{config.task.name!r}: cars without a common clock do not share a plan over time"
         )
+    first = config.constellation.ids[0]
+    if config.task.name in ("escort", "seek") and node == first:
+        raise BridgeError(
+            f"--node: expected another one than {first}, which the others escort or seek: a person "
+            "moves it"
+        )
     if config.task.command == "link":
         raise BridgeError(
             'task.command: a car alone expects "plan", got "link": an operator commands a group'

@@ -21,6 +21,7 @@ from hardware_bridge.ingest.at_rest import AtRest
 from hardware_bridge.ingest.events import Events
 from hardware_bridge.ingest.naming import Naming
 from hardware_bridge.ingest.operator_trims import Trims
+from hardware_bridge.ingest.peers import Peers
 from hardware_bridge.ingest.rangefinder import Near
 from hardware_bridge.ingest.repeated_samples import RepeatedSamples
 from hardware_bridge.ingest.sample_rates import SampleRates
@@ -61,7 +62,7 @@ class Intake:
         Raises:
             BridgeError: A format or driver does not fit its options.
         """
-        self.group, self._alone = config.constellation, config.alone
+        self.group = config.constellation
         self.start_ns = start_ns
         self.events = Events()
         self.plausibility = Plausibility()
@@ -87,6 +88,8 @@ class Intake:
         self.at_rest = AtRest(self.group.nodes)
         self._repeated = RepeatedSamples(rates)
         self._naming = Naming(self.group, self.refused, self.notices)
+        own = None if config.alone is None else self.group.index_of[config.alone]
+        self._peers = Peers(own, self._naming, self.plausibility, self.refused)
         self.trims = Trims(self._naming, self.refused)
         self.other = OtherTracker(
             start_ns, self.group.ids, self._naming, self.plausibility, self.refused, self.notices
@@ -169,7 +172,7 @@ class Intake:
             self.received_ns.update(dict.fromkeys(nodes, arrival_ns))
             return
         node = self._naming.index(stream, source.device, arrival_ns)
-        if node is None:
+        if node is None or self._peers.are_measured_elsewhere(stream, node):
             return
         if source is not stream.source or source is UNNAMED:
             self._judge(stream, source, node, arrival_ns)
@@ -248,18 +251,12 @@ class Intake:
             self.notices.append((arrival_ns, text))
         return bool(why)
 
-    def _use_peer(
-        self, stream: Stream, reading: PeerReading, sender: int, t: float, arrival_ns: int
-    ) -> bool:
-        node = self._naming.index(stream, reading.of, arrival_ns, named=True)
-        # The tracker of a group has the samples of the others, which say more. Motion may repeat: a
-        # node at rest sends the same again and again.
-        is_used = node != sender and self.group.ids[sender] == self._alone
-        if node is None or not is_used or not self.plausibility.allows_state(reading):
+    def _use_peer(self, stream: Stream, r: PeerReading, sender: int, t: float, now_ns: int) -> bool:
+        node = self._peers.node_of(stream, r, sender, now_ns)
+        if node is None:
             return False
-        values = (*reading.q_wb, *reading.accel_w, reading.noise)
-        self.events.add(t - reading.age, Kind.STATE, node, values)
-        self.received_ns[node] = arrival_ns
+        self.events.add(t - r.age, Kind.STATE, node, (*r.q_wb, *r.accel_w, r.noise))
+        self.received_ns[node] = max(now_ns - round(1e9 * r.age), self.received_ns.get(node, 0))
         return True
 
     def _use_range(

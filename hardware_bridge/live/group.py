@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from hardware_bridge.config.alone import TASKS_ALONE
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.live.estimated_state import EstimatedState
 from hardware_bridge.live.picture import draw_picture
@@ -78,7 +79,11 @@ class LiveGroup:
         n = config.n_slots
         made = partial(make_task, config.task.name, n, 1, config.task.room, **config.task.options)
         self.task = made()
-        self._reassignment = None if config.alone is None else Reassignment(made)
+        self._reassignment = (
+            Reassignment(made)
+            if config.alone is not None and config.task.name in TASKS_ALONE
+            else None
+        )
         self._weights = reward_weights(config.task.name, self.task)
         self.estimated = EstimatedState(n)
         self._figures = make_figures(1, n, len(self.task.terms))
@@ -183,7 +188,8 @@ class LiveGroup:
             self._begun = self.cycles
         now = np.array([(self.cycles - self._begun) * DECISION])
         task.update(estimated, now, self._no_cars, here)
-        if self._reassignment is not None and self.cycles % REASSIGN_EVERY == 0:
+        is_due = self.placed and estimated.complete and self.cycles % REASSIGN_EVERY == 0
+        if self._reassignment is not None and is_due:
             self._reassignment.repeat(task, estimated, now, self._no_cars)
         if isinstance(task, InformedTask):
             task.inform(swarm.view.cov, swarm.view.ok, here)

@@ -29,7 +29,8 @@ class StartParams:
     """Parameters of the start-up."""
 
     wait: float = 60.0
-    """[s] Longest wait until all cars are armed; then the start-up fails."""
+    """[s] Longest wait until all cars are armed; then the start-up fails. For a car that decides
+    alone it is also the longest excitation, since the others may start later."""
     find: float = 30.0
     """[s] Longest excitation; then the drive begins once all cars are back at their start."""
     sure: float = 1.0

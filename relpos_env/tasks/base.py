@@ -195,8 +195,8 @@ class Task(ABC):
 class DrivingTask(Task):
     """A task that drives a car itself; its rooms have no operator."""
 
-    has_samples: Bool
-    """False for cars without inertial sensors and magnetometer, (car)."""
+    has_samples: Bool | bool = True
+    """False for cars without inertial sensors and magnetometer, (car), or one value for all."""
 
     @abstractmethod
     def plan_drive(self, env: int, rng: np.random.Generator) -> None:

@@ -68,7 +68,6 @@ class Escort(DrivingTask):
         self._places: F64 = np.zeros((n_envs, n_cars, 2))
         self._waypoints: F64 = np.zeros((n_envs, N_WAYPOINTS, 3))
         self._now: F64 = np.zeros((n_envs, 2))
-        self.has_samples: Bool = np.ones(n_cars, dtype=bool)
 
     def plan_drive(self, env: int, rng: np.random.Generator) -> None:
         """Draw the waypoints of the escorted car, and its rest at each."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from relpos_env.tasks.escort import Escort
 
 
@@ -23,4 +25,4 @@ class Seek(Escort):
     ) -> None:
         """Check the options; these and the errors are those of `Escort`."""
         super().__init__(n_cars, n_envs, room, spacing=spacing, speed=speed)
-        self.has_samples[0] = False
+        self.has_samples = np.arange(n_cars) > 0

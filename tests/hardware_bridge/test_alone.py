@@ -15,7 +15,13 @@ from hardware_bridge.emulator.ports import MemoryPort
 from hardware_bridge.errors import BridgeError
 from hardware_bridge.links.ports import Chunk
 from hardware_bridge.live.swarm import LiveSwarm
-from hardware_bridge.readings import MICROSECONDS_32, ImuReading, PeerReading, Source
+from hardware_bridge.readings import (
+    MICROSECONDS_32,
+    ImuReading,
+    PeerReading,
+    RangeReading,
+    Source,
+)
 from hardware_bridge.safety.geometry.braking import stopping_way
 from hardware_bridge.safety.params import SafetyParams
 from hardware_bridge.wire.encoder import RelposEncoder
@@ -77,6 +83,7 @@ def test_only_its_own_car_is_driven_and_the_others_have_half_of_the_way():
     [
         (config_of(), 7, r"^--node: expected a node that moves \(1, 2, 3\), got 7"),
         (config_of("ring"), 2, "^task.name: .* expects one of hold, .*, got 'ring'"),
+        (config_of("seek"), 1, "^--node: expected another one than 1, which the others"),
         (config_of(command="link"), 2, '^task.command: .* expects "plan"'),
     ],
 )
@@ -122,6 +129,7 @@ def test_a_car_at_rest_is_not_a_stuck_sensor():
         ([peer(9)], 2),  # of no node of the group
         ([peer(1)], 3),  # by another node than the own
         ([PeerReading(Source(), "1", 0.0, LEVEL, (400.0, 0.0, 0.0))], 2),  # impossible
+        ([peer(1, age=1.5)], 2),  # too old
     ],
 )
 def test_other_motions_are_not_used(readings, node):
@@ -130,6 +138,27 @@ def test_other_motions_are_not_used(readings, node):
     says(swarm, S, *readings, node=node)
     swarm.step(S)
     assert not [row for row in taken if row[0] == Kind.STATE]
+
+
+def test_measurements_of_other_nodes_are_not_what_the_own_radio_received():
+    swarm = LiveSwarm(alone(config_of(), 2), 0)
+    taken = rows(swarm)
+    sample = ImuReading(Source(), (0.0,) * 3, (0.0, 0.0, 9.8))
+    says(swarm, S, sample, RangeReading(Source(), "2", 1.5), node=1)
+    says(swarm, S, sample, RangeReading(Source(), "3", 2.5, nearer="1"))
+    swarm.step(S)
+    assert sorted(row[:2] for row in taken if row[0] in (Kind.IMU, Kind.RANGE)) == [
+        (Kind.IMU, 1), (Kind.RANGE, 0)
+    ]  # fmt: skip
+    assert swarm.intake.refused["other_node"] == 2
+
+
+def test_old_motion_does_not_keep_a_silent_node():
+    swarm = LiveSwarm(alone(config_of(), 2), 0)
+    says(swarm, 2 * S, peer(1, age=0.5))
+    assert swarm.intake.received_ns[0] == pytest.approx(1.5 * S, abs=1e6)
+    says(swarm, 2 * S + 1000, peer(1, age=0.9), sequence=1)
+    assert swarm.intake.received_ns[0] == pytest.approx(1.5 * S, abs=1e6)
 
 
 def test_a_host_of_the_group_uses_the_samples_instead():
@@ -217,7 +246,13 @@ def test_estimates_are_those_of_trackers_on_the_cars():
         assert swarm.n_late == 0
 
 
+@pytest.mark.parametrize("task", ["ring", "seek", "inspect"])
+def test_tasks_that_cannot_be_driven_so_are_refused(task):
+    with pytest.raises(BridgeError, match=r"^task: (expected one of hold|'\w+' is not emulated)"):
+        EmulateOptions(task=task, trackers="own")
+
+
 def test_nodes_of_another_format_have_no_message_for_it():
     with pytest.raises(BridgeError, match="format: expected relpos with own trackers"):
-        EmulateOptions(trackers="own", format="linktrack")
-    assert not EmulateOptions(trackers="own").operator
+        EmulateOptions(task="hold", trackers="own", format="linktrack")
+    assert not EmulateOptions(task="hold", trackers="own").operator

@@ -1,12 +1,17 @@
 """Tasks that end in a place or a picture: a transponder that only ranges, walls to be seen."""
 
+import pickle
+
 import numpy as np
 import pytest
 
 from relpos_env import formation_v0
+from relpos_env.config import configure
+from relpos_env.core.env_core import EnvCore
 from relpos_env.errors import EnvError
-from relpos_env.tasks import make_task
+from relpos_env.tasks import DrivingTask, make_task
 from relpos_env.tasks.inspect import wall_points
+from relpos_env.tasks.rendezvous import Rendezvous
 from tracking.measurements import Kind
 
 CURVE = np.array([0.4, 0.5], np.float32)
@@ -32,6 +37,43 @@ def test_of_the_transponder_nothing_but_ranges_is_known(trackers):
     assert samples == {1, 2}
     assert ranges > 100
     assert not env.formation.loop.view.oriented[0, 0]
+
+
+@pytest.mark.parametrize("task", ["seek", "inspect"])
+def test_threads_and_copies_give_the_same(task):
+    """Cars come and go in this scenario."""
+    cores = []
+    for threads in (1, 2):
+        parts = configure({"task": task, "scenario": "swarm-nlos", "max_cycles": 60})
+        core = EnvCore(parts, 4, threads)
+        for env in range(4):
+            core.seed(env, np.random.default_rng(env))
+        core.begin(range(4))
+        cores.append(core)
+    rng = np.random.default_rng(0)
+    for step in range(60):
+        if step == 30:
+            cores.append(pickle.loads(pickle.dumps(cores[0])))
+        speed, steering = rng.uniform(-1.0, 1.0, (2, 4, cores[0].parts.n_cars))
+        for core in cores:
+            core.step(speed, 0.4 * steering)
+    for core in cores[1:]:
+        np.testing.assert_array_equal(core.observations, cores[0].observations)
+        np.testing.assert_array_equal(core.rewards, cores[0].rewards)
+        core.close()
+
+
+def test_a_task_of_ones_own_that_drives_needs_no_more():
+    class Mine(DrivingTask, Rendezvous):
+        def plan_drive(self, env, rng):
+            pass
+
+        def drive(self, state, t, speed, steering):
+            speed[:, 0] = 0.5
+
+    env = formation_v0.parallel_env(task=Mine, scenario="open", n_cars=2, max_cycles=10)
+    *_, _ = run(env, 10)
+    assert env.formation.loop.has_samples.all()
 
 
 def test_it_is_found_all_the_same():

@@ -18,7 +18,8 @@ from agents.errors import UsageError
     "--out",
     type=Path,
     required=True,
-    help="Folder for the ports and, once they are ready, swarm.toml.",
+    help="Folder for the ports and, once they are ready, swarm.toml, or with own trackers "
+    "swarm-1.toml and so on.",
 )
 @scenario_option("; by default that of the task.")
 @task_option

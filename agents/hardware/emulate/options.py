@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from hardware_bridge.config.alone import TASKS_ALONE
 from hardware_bridge.emulator.fault_plan import FaultPlan
 from hardware_bridge.emulator.formats import WireFormat, check_formats, wire_format
 from hardware_bridge.emulator.node import NodeParams
@@ -25,6 +26,9 @@ IMU_FORMAT = "witmotion"
 LONGEST = 86400.0
 """[s] Longest emulation."""
 
+
+NOT_EMULATED = ("escort", "seek", "inspect")
+"""Tasks that drive a car themselves, or need its estimates."""
 
 SLOW_PWM = {
     "forward": ((0.1, 1525), (3.0, 1750)),
@@ -80,6 +84,16 @@ class EmulateOptions:
             object.__setattr__(self, "operator", False)
             if self.format != "relpos":
                 raise BridgeError(f"format: expected relpos with own trackers, got {self.format!r}")
+            if self.task not in TASKS_ALONE:
+                expected = ", ".join(sorted(set(TASKS_ALONE) - set(NOT_EMULATED)))
+                raise BridgeError(
+                    f"task: expected one of {expected} with own trackers, got {self.task!r}"
+                )
+        if self.task in NOT_EMULATED:
+            raise BridgeError(
+                f"task: {self.task!r} is not emulated: cars that drive by themselves and estimates "
+                "are not part of the emulated world"
+            )
         if not DECISION <= self.seconds <= LONGEST:
             raise EnvError(f"seconds: expected {DECISION:g} to {LONGEST:g}, got {self.seconds!r}")
         whole_number("proximity", self.proximity, 0, MAX_RANGEFINDERS)

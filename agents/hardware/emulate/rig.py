@@ -137,10 +137,12 @@ class EmulatedRig:
         return swarm_toml(self.options, self.world.parts, self.constellation, nodes, folder, only)
 
     def _write(self, folder: Path) -> None:
-        """Write ``swarm.toml`` atomically, after those of single cars."""
-        alone = self.constellation.ids if self.options.trackers == "own" else ()
-        files = {f"swarm-{node}.toml": node for node in alone}
-        for name, only in [*files.items(), (SWARM_FILE, None)]:
+        """Write ``swarm.toml`` atomically; with own trackers those of single cars instead."""
+        files: dict[str, int | None] = {SWARM_FILE: None}
+        if self.options.trackers == "own":
+            # A host of the group would receive each range from several nodes.
+            files = {f"swarm-{node}.toml": node for node in self.constellation.ids}
+        for name, only in files.items():
             text = self.swarm_toml(folder, only)
             write_safely(folder / name, text, mode=0o644 if self.options.key is None else 0o600)
             # These devices are new: the replay protection of earlier ones with these ids is reset.
