@@ -21,8 +21,7 @@ from relpos_env.interface._info_kernels import write_figures
 from relpos_env.interface.infos import Columns, car_columns, make_figures
 from relpos_env.interface.observations import ObservationMode, total_size
 from relpos_env.interface.observations.base import F32
-from relpos_env.tasks import InformedTask, make_task, reward_weights
-from relpos_env.tasks.reassignment import Reassignment
+from relpos_env.tasks import InformedTask, Reassignment, make_task, reward_weights
 from relpos_env.timing import DECISION
 from tracking.arrays import F64, Bool
 

@@ -66,16 +66,10 @@ class EnvCore:
                 f"into the space, got {physics!r}"
             )
         self.loop = TrackedWorld(
-            parts.scenario,
-            n,
-            n_envs,
-            filter=config.filter,
-            params=parts.params,
-            trackers=config.trackers,
-            n_steps=round(DECISION / DT),
-            proximity=config.proximity,
+            parts.scenario, n, n_envs, filter=config.filter, params=parts.params,
+            trackers=config.trackers, n_steps=round(DECISION / DT), proximity=config.proximity,
             physics=physics,
-        )
+        )  # fmt: skip
         self.task = parts.make_task(n_envs)
         gain = config.operator.gain
         if isinstance(self.task, DrivingTask):

@@ -12,6 +12,7 @@ from relpos_env.tasks.base import DrivingTask, InformedTask, Task, Truth
 from relpos_env.tasks.escort import Escort
 from relpos_env.tasks.follow import follow
 from relpos_env.tasks.gap import Gap
+from relpos_env.tasks.geometry.reassignment import Reassignment
 from relpos_env.tasks.hold import hold
 from relpos_env.tasks.inspect import Inspect
 from relpos_env.tasks.observe import observe
@@ -85,6 +86,7 @@ __all__ = [
     "TASKS",
     "DrivingTask",
     "InformedTask",
+    "Reassignment",
     "Task",
     "Truth",
     "make_task",

@@ -78,7 +78,7 @@ def test_a_car_that_was_off_knows_nothing_of_before():
     core = core_of(1)
     run(core, 0, 20)
     assert core.loop.view.ok[0, 0, 1:].all()
-    world, epoch = core.loop.swarm, int(core.loop.perception._senders["epoch"][0, 0])
+    world, epoch = core.loop.swarm, int(core.loop.perception._own._senders["epoch"][0, 0])
     world.powered[0, 0] = False
     world._radio.switch_off(0, 0)
     run(core, 20, 2)
@@ -88,7 +88,7 @@ def test_a_car_that_was_off_knows_nothing_of_before():
     run(core, 22, 1)
     assert not core.loop.view.ok[0, 0].any()
     run(core, 23, 1)
-    assert int(core.loop.perception._senders["epoch"][0, 0]) == epoch + 1
+    assert int(core.loop.perception._own._senders["epoch"][0, 0]) == epoch + 1
     driver = LoopDrivers(scenario("cars-nlos"), np.random.default_rng(0), 3)
     for _ in range(120):
         command = driver.command(core.state.take(0))

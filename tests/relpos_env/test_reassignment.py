@@ -6,8 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from relpos_env.tasks import make_task
-from relpos_env.tasks.reassignment import Reassignment
+from relpos_env.tasks import Reassignment, make_task
 
 HERE = slice(0, 1)
 

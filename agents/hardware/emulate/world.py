@@ -17,7 +17,7 @@ from relpos_env.interface.own_events import OwnEvents
 from relpos_env.scenarios.episode import Episode, draw_episode
 from relpos_env.sensors.operator import Operator
 from relpos_env.simulation.recorder import Recording
-from relpos_env.tasks.reassignment import Reassignment
+from relpos_env.tasks import Reassignment
 from relpos_env.timing import DECISION, DT, SOON, STAND_STILL
 from relpos_env.world.world import World
 from tracking.arrays import F64, Bool
