@@ -57,7 +57,8 @@ class Recording:
             self.add_truth(t, pos, q[k], swarm.state.present[0])
         block = swarm.block.take(slice(0, n))
         ranges = block.kind[0] == Kind.RANGE
-        self.add_block(block.take(np.arange(n)), events.nlos[0, :n][ranges])
+        # Of cars without sensors there are no samples.
+        self.add_block(block.take(block.valid[0]), events.nlos[0, :n][ranges])
 
     def to_log(
         self, name: str, scenario: str, constellation: Constellation, *, truth_every: int

@@ -76,6 +76,16 @@ def test_a_task_of_ones_own_that_drives_needs_no_more():
     assert env.formation.loop.has_samples.all()
 
 
+def test_a_recording_has_no_samples_of_the_transponder():
+    env = formation_v0.parallel_env(task="seek", n_cars=4, max_cycles=50, record=True)
+    *_, _ = run(env, 50)
+    log = env.recorded_log("seek")
+    assert log.block.valid.all()
+    kinds = log.block.kind[0]
+    assert set(log.block.i[0, kinds == Kind.IMU].tolist()) == {1, 2, 3}
+    assert len(log.nlos) == (kinds == Kind.RANGE).sum()
+
+
 def test_it_is_found_all_the_same():
     env = formation_v0.parallel_env(task="seek", n_cars=5, scenario="hall", max_cycles=200)
     found = []
