@@ -28,6 +28,13 @@ json_option = click.option(
 cars_option = click.option(
     "--cars", type=int, help="Number of cars, 2 to 20.  [default: as many as the scenario has]"
 )
+trackers_option = click.option(
+    "--trackers",
+    type=click.Choice(["group", "own"]),
+    default="group",
+    show_default=True,
+    help="group: one tracker receives the samples of all cars; own: one on each car.",
+)
 task_option = click.option(
     "--task",
     default="ring",

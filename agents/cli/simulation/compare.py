@@ -15,6 +15,7 @@ from agents.cli.options import (
     json_option,
     out_options,
     scenario_option,
+    trackers_option,
 )
 from agents.errors import UsageError
 
@@ -59,13 +60,7 @@ WHY = "which has its own cars and task; they drive one after the other"
     type=int,
     help="Number of distance sensors on each car, 0 to 32.  [default: those of the policies]",
 )
-@click.option(
-    "--trackers",
-    type=click.Choice(["group", "own"]),
-    default="group",
-    show_default=True,
-    help="group: one tracker receives the samples of all cars; own: one on each car.",
-)
+@trackers_option
 @click.option(
     "--level",
     help="Randomisation in every scenario: easy, medium, hard, expert, or 0 to 4.",

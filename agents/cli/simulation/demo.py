@@ -9,7 +9,14 @@ from typing import Any
 import click
 
 from agents.cli.console import emit_json, print_table, progress_bar
-from agents.cli.options import cars_option, json_option, out_options, policy_option, scenario_option
+from agents.cli.options import (
+    cars_option,
+    json_option,
+    out_options,
+    policy_option,
+    scenario_option,
+    trackers_option,
+)
 from agents.cli.tracking.track import print_tracks
 from agents.errors import UsageError
 
@@ -45,13 +52,7 @@ from agents.errors import UsageError
     show_default=True,
     help="Filter of the tracker: joint, ekf-mds, ekf, paper-ekf-mds or paper-ekf.",
 )
-@click.option(
-    "--trackers",
-    type=click.Choice(["group", "own"]),
-    default="group",
-    show_default=True,
-    help="group: one tracker receives the samples of all cars; own: one on each car.",
-)
+@trackers_option
 @click.option("--window", is_flag=True, help="Show the drive in a window; needs pygame.")
 @click.option("--gif", is_flag=True, help="Write drive.gif too; needs pygame.")
 @out_options("report.html and drive.gif", default=Path("demo"))
